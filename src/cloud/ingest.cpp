@@ -170,7 +170,7 @@ void Ingest::set_region_of_interest(const RegionOfInterest& region) {
 }
 
 void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FP, Span<const PosedSolid> robot,
-                 double stamp, CloudSnapshot* snapshot) {
+                 double stamp, CloudSnapshot* snapshot, Span<const double> paddings) {
   const auto start = std::chrono::steady_clock::now();
   const IngestConfig& config = impl_->config;
   const Eigen::Isometry3d X_FS = X_FP * Eigen::Translation3d(cloud.origin);
@@ -194,7 +194,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FP, Span<cons
   } else {
     set_axes(scene_axes(cloud, X_FS.linear(), organized), &crop);
     if (on_robot != nullptr) {
-      on_robot->set_poses(robot, crop.X_FO, config.self_filter_padding);
+      on_robot->set_poses(robot, crop.X_FO, config.self_filter_padding, paddings);
     }
   }
   IngestCounts counts;

@@ -1,11 +1,13 @@
 #include "ist_proximity/facade/obstacles.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "internal/cloud/unmeasured.h"
 #include "internal/facade/sensor_points.h"
+#include "internal/robot/coarse_hulls.h"
 #include "obstacle_ingest.h"
 
 namespace ist {
@@ -22,6 +24,20 @@ std::shared_ptr<const CloudSnapshot> index(const RawCloud& cloud, const Obstacle
                                 "that there are no obstacles.");
   }
   return snapshot;
+}
+
+// What is between a coarse hull and the link that it is drawn around is no part of the robot.
+void leave_out_hulls(const RobotDescription& description, const RobotModel& model,
+                     std::vector<bool>* known) {
+  const auto find = [&](const std::string& name) {
+    return std::find_if(model.links.begin(), model.links.end(),
+                        [&](const LinkModel& link) { return link.name == name; });
+  };
+  for (const CoarseHull& hull : coarse_hulls(description, {})) {
+    const auto coarse = find(hull.link), fine = find(hull.enclosed);
+    if (!hull.is_below || coarse == model.links.end() || fine == model.links.end()) continue;
+    (*known)[static_cast<std::size_t>(coarse - model.links.begin())] = false;
+  }
 }
 
 /// Keeps a copy of the image: its points are read when a query first needs them.
@@ -50,8 +66,9 @@ IngestConfig to_ingest_config(const ObstaclesConfig& config) {
 ObstacleIngest::ObstacleIngest(const ObstaclesConfig& config)
     : X_FS_(config.X_FS), ingest_(to_ingest_config(config)) {
   if (config.robot == nullptr) return;
-  const LinkPoses poses = config.robot->link_poses(config.q);
+  LinkPoses poses = config.robot->link_poses(config.q);
   model_ = config.robot->model();
+  leave_out_hulls(config.robot->description(), *model_, &poses.known);
   robot_ = posed_solids(*model_, poses.X_FL, poses.known);
 }
 

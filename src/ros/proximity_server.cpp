@@ -67,12 +67,12 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
         private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1), kDrawnUnseen,
         buffer_);
   }
-  query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_,
-                                                  live, unknown_space_.get());
+  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live,
+                                                  unknown_space_.get());
   if (config_.self_collision.enabled) {
-    self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
-                                                      joint_states_.get(), live);
-    link_pairs_ = std::make_unique<LinkPairService>(nh_, private_nh_, config_);
+    self_proximity_ =
+        std::make_unique<SelfProximity>(private_nh_, config_, buffer_, joint_states_.get(), live);
+    link_pairs_ = std::make_unique<LinkPairService>(private_nh_, config_);
   }
   cycle_thread_ = std::thread(&Impl::run_cycles, this);
   diagnostics_thread_ = std::thread(&Impl::run_diagnostics, this);

@@ -64,8 +64,9 @@ void ProximityServer::Impl::take_model() {
 void ProximityServer::Impl::choose_counted_links() {
   const CountedLinks before = std::move(counted_);
   counted_ = counted_links(*model_, config_, root_stands_still_);
-  results_.set_links(counted_);
-  std::string problem = counted_.problem;
+  const CountedLinks self = counted_links(*with_paired(model_), config_, root_stands_still_);
+  results_.set_links(counted_, self);
+  std::string problem = self.problem;
   if (model_->robot) {
     const std::vector<std::string> missing =
         SpeedScale(counted_.links).unknown_links(live_.get().speed_scale);
@@ -131,7 +132,8 @@ void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
     // Clouds that were cropped before serve finer packings, too.
     region_radius_ = region.radius = std::max(region.radius, region_radius_);
   }
-  for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, region);
+  for (const auto& source : sources_)
+    source->set_model(model_->robot, fixed_frame, region, model_->filters);
 }
 
 }  // namespace ist

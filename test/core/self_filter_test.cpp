@@ -10,7 +10,10 @@
 
 #include "cloud/filters/field_verdict_kernel.h"
 #include "internal/packing/packer.h"
+#include "internal/robot/coarse_hulls.h"
 #include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/facade/obstacles.h"
+#include "ist_proximity/facade/robot.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "support/allocations.h"
 #include "support/distance_fields.h"
@@ -388,6 +391,81 @@ TEST(SelfFilter, aRobotThatComesNearAllocatesNothing) {
     EXPECT_EQ(test::allocations - before, 0) << "step " << k;
   }
   EXPECT_GT(snapshot.counts.on_robot, 0U);
+}
+
+// A link (a capsule, but for its ends), the capsule for planning about it, and what is no hull: a
+// hand about its finger, a mark in a link, a shape beside a link, what a joint moves.
+std::string urdf_with_hull() {
+  const auto link = [](const std::string& name, const std::string& shape, double z = 0.0) {
+    return "<collision><origin xyz='0 0 " + std::to_string(z) + "'/><geometry>" + shape +
+           "</geometry></collision>" + (name.empty() ? "" : "</link>");
+  };
+  const auto joint = [](const std::string& parent, const std::string& child,
+                        const std::string& type = "fixed", const std::string& xyz = "0 0 0") {
+    return "<joint name='to_" + child + "' type='" + type + "'><parent link='" + parent +
+           "'/><child link='" + child + "'/><origin xyz='" + xyz +
+           "'/><limit lower='0' upper='1' effort='1' velocity='1'/></joint>";
+  };
+  const auto begin = [](const std::string& name) { return "<link name='" + name + "'>"; };
+  const std::string fine = "<cylinder radius='0.05' length='0.3'/>",
+                    ball = "<sphere radius='0.1'/>";
+  return "<robot name='r'>" + begin("arm") + link("arm", fine) + begin("arm_sc") +
+         link("", "<cylinder radius='0.1' length='0.3'/>") + link("", ball, 0.15) +
+         link("arm_sc", ball, -0.15) + begin("hand") + link("hand", "<box size='0.3 0.3 0.3'/>") +
+         begin("finger") + link("finger", "<box size='0.2 0.2 0.2'/>") + begin("mark") +
+         link("mark", "<sphere radius='0.001'/>") + begin("ball") + link("ball", ball) +
+         begin("beside") + link("beside", "<sphere radius='0.15'/>") + begin("moved") +
+         link("moved", "<sphere radius='0.2'/>") + joint("arm", "arm_sc") +
+         joint("arm", "hand", "revolute", "0 0 5") + joint("hand", "finger") +
+         joint("finger", "mark") + joint("arm", "ball", "revolute", "0 5 0") +
+         joint("ball", "beside", "fixed", "0 0.2 0") + joint("ball", "moved", "revolute") +
+         "</robot>";
+}
+
+TEST(SelfFilter, NothingBetweenALinkAndACoarseHullIsDropped) {
+  const RobotDescription description = parse_urdf(urdf_with_hull(), GeometrySource::kCollision, {});
+  const std::vector<CoarseHull> hulls = coarse_hulls(description, {});
+  ASSERT_EQ(hulls.size(), 1U);
+  EXPECT_EQ(hulls[0].link, "arm_sc");
+  EXPECT_EQ(hulls[0].enclosed, "arm");
+  EXPECT_TRUE(hulls[0].is_below);
+  RobotModelConfig model_config;
+  model_config.links = {"arm", "arm_sc"};
+  const auto model = build_robot_model(description, model_config, {});
+  ASSERT_EQ(model->links.size(), 2U);
+  PosedRobot robot = posed(*model);
+  robot.X_FL.assign(2, Eigen::Isometry3d::Identity());
+  for (std::size_t i = 0; i < 2; ++i) robot.known[i] = model->links[i].name != hulls[0].link;
+  std::vector<Eigen::Vector3f> points;
+  std::vector<float> distances;
+  for (const float d : {0.0F, 0.01F, 0.019F, 0.021F, 0.03F, 0.04F, 0.05F, 0.06F, 0.07F}) {
+    for (int i = 0; i < 20; ++i) {
+      const float angle = 0.3F * static_cast<float>(i), z = 0.01F * static_cast<float>(i - 10);
+      points.emplace_back((0.05F + d) * std::cos(angle), (0.05F + d) * std::sin(angle), z);
+      distances.push_back(d);
+    }
+  }
+  const auto expect_dropped = [&](const CloudSnapshot& snapshot, float padding) {
+    const std::set<std::uint32_t> kept = ids(snapshot.index);
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(kept.count(i) > 0, distances[i] > padding) << distances[i] << " m";
+    }
+  };
+  expect_dropped(ingest(points, robot, config_with(0.02)), 0.02F);
+  const Robot loaded(urdf_with_hull());
+  ObstaclesConfig config;
+  config.robot = &loaded;
+  config.q.assign(loaded.joints().size(), 0.0);
+  EXPECT_EQ(Obstacles(points, config).counts().on_robot, 60U);
+  // A padding of the link's own.
+  const std::vector<PosedSolid> solids = robot.solids();
+  ASSERT_EQ(solids.size(), 1U);
+  for (const double padding : {0.005, 0.045}) {
+    CloudSnapshot snapshot;
+    Ingest(config_with(0.02))
+        .run(raw_of(points), Eigen::Isometry3d::Identity(), solids, 0.0, &snapshot, {&padding, 1});
+    expect_dropped(snapshot, static_cast<float>(padding));
+  }
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import proximity_testing as pt
 import rospy
-from proximity_testing import ProximityArray
+from proximity_testing import LinkProximity, ProximityArray
 
 LATE = 0.3  # [s] of the clouds
 SPEED = 1.0  # [m/s]
@@ -53,6 +53,79 @@ class SelfFilterTest(pt.NodeTest):
         for message in self.node.messages[begin:]:
             if message.status == ProximityArray.OK:
                 self.assertEqual(counts(message), (len(BALL), 1))
+
+
+    def check_filter(self, case, robot, srdf="", **parameters):
+        """Starts a node, and waits until so many of four points are the robot's."""
+        namespace = self.namespace + case
+        sphere = "<collision><geometry><sphere radius='%g'/></geometry></collision>"
+        links = {"ball_link": 0.1, "hull": 0.18, "tool": 0.05}
+        joint = "<joint name='to_%s' type='%s'><parent link='%s'/><child link='%s'/>%s</joint>"
+        urdf = "<robot name='r'><link name='base'/>%s%s%s%s</robot>" % (
+            "".join("<link name='%s'>%s</link>" % (n, sphere % r) for n, r in links.items()),
+            joint % ("ball", "continuous", "base", "ball_link", "<axis xyz='0 1 0'/>"),
+            joint % ("hull", "fixed", "ball_link", "hull", ""),
+            joint % ("tool", "continuous", "base", "tool", "<origin xyz='0 0.5 0'/>"),
+        )
+        self.world = pt.World(namespace)
+        self.world.poses = {name: ("base", pt.transform()) for name in links}
+        self.world.poses["tool"] = ("base", pt.transform((0, 0.5, 0)))
+        # On ball_link, between it and the hull, on the tool, and on none.
+        self.world.points = np.array([[0.1, 0, 0], [0.15, 0, 0], [0, 0.5, 0.05], [0, -0.5, 0]])
+        self.world.start_tf()
+        self.world.start_clouds()
+        if srdf:
+            rospy.set_param(namespace + "/robot_description_semantic", srdf)
+        self.node = pt.ProximityNode(namespace, parameters, urdf)
+        message = self.node.wait_for(
+            lambda m: m.status == ProximityArray.OK
+            and (m.sources[0].points_on_robot, m.sources[0].points_used) == (robot, 4 - robot),
+            "%d points on the robot" % robot,
+        )
+        self.world.stop()
+        return message
+
+    def test_coarse_hulls(self):
+        """What is between a link and a hull about it is an obstacle; the SRDF says what hulls are."""
+        srdf = (
+            "<robot name='r'><disable_default_collisions link='%s'/>"
+            "<enable_collisions link1='hull' link2='tool'/><disable_colisions/></robot>"
+        )
+        around = "hull (around ball_link)"
+        with self.subTest("without an SRDF"):
+            message = self.check_filter("alone", 2)
+            self.assertEqual(pt.link(message, "hull").state, LinkProximity.CONTACT)
+            self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.05, 3)
+            self.assertEqual(self.node.log().count(around), 1)
+            self.node.wait_until(
+                lambda: around in (self.node.diagnostic("model", "warning") or ""), "the warning"
+            )
+            self.assertEqual(self.node.stop(), 0)
+        with self.subTest("off in the SRDF"):
+            message = self.check_filter("off", 2, srdf % "hull", **{"self_collision/enabled": True})
+            self.assertEqual([one.link for one in message.links], ["ball_link", "tool"])
+            self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.05, 3)
+            self.assertEqual(self.node.log().count(around), 1)
+            self.node.wait_until(
+                lambda: around in (self.node.diagnostic("model", "links left out") or ""), "the hull"
+            )
+            told = "<disable_colisions> (line 1)"
+            self.assertEqual(self.node.log().count(told), 1)
+            self.assertIn(told, self.node.diagnostic("model", "warning"))
+            own = rospy.wait_for_message(self.node.name + "/self_proximity", ProximityArray, 10)
+            self.assertEqual([one.link for one in own.links], ["ball_link", "tool", "hull"])
+            self.assertAlmostEqual(pt.link(own, "hull").distance, 0.5 - 0.18 - 0.05, 3)
+            self.assertEqual(self.node.stop(), 0)
+        for case, robot, parameters in (
+            ("monitored", 1, {"links": ["ball_link"]}),
+            ("all", 3, {"links": ["ball_link"], "self_filter_links": "all"}),
+            ("named", 2, {"self_filter_links": ["ball_link", "tool"]}),
+            ("padded", 3, {"self_filter_padding": {"default": 0.01, "ball_link": 0.06}}),
+        ):
+            with self.subTest(case):
+                self.check_filter(case, robot, **parameters)
+                if case != "padded":
+                    self.assertEqual(self.node.stop(), 0)
 
 
 if __name__ == "__main__":

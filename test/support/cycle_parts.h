@@ -26,7 +26,8 @@ class StatedSource : public ObstacleSource {
   }
 
   void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                 const RegionOfInterest& region) override {
+                 const RegionOfInterest& region,
+                 const std::vector<bool>& /*filters*/ = {}) override {
     snapshot_->model = std::move(model);
     snapshot_->fixed_frame = fixed_frame;
     snapshot_->cloud.region = region;

@@ -176,11 +176,13 @@ class Ingest {
   ///               at any of them is dropped. Empty: no self-filter
   /// @param stamp  [s]
   /// @param snapshot  overwritten, its buffers reused
+  /// @param paddings  [m] >= 0, by element of `robot`: with SelfFilterMode::kPadding, in place of
+  ///                  self_filter_padding. Empty: none
   /// @throws std::invalid_argument when X_FP is not finite or farther than 10^9 m from the origin,
   /// or
   ///         the cloud has more than max_points; the snapshot is as before then
   void run(const RawCloud& cloud, const Eigen::Isometry3d& X_FP, Span<const PosedSolid> robot,
-           double stamp, CloudSnapshot* snapshot);
+           double stamp, CloudSnapshot* snapshot, Span<const double> paddings = {});
 
   const IngestConfig& config() const;  ///< the one given to the constructor
 

@@ -32,8 +32,7 @@ std::uint32_t slots_within(const PointTile& tile, std::uint32_t first, std::uint
 }  // namespace
 
 void SelfFilter::set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3d& X_FO,
-                           double padding) {
-  padding_ = padding;
+                           double padding, Span<const double> own) {
   links_.clear();
   group_.clear();
   undecided_.clear();
@@ -42,10 +41,12 @@ void SelfFilter::set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3
     const InnerSphereTree& tree = *posed.tree;
     if (tree.empty()) continue;
     const Eigen::Isometry3d X_OL = relative_pose(X_FO, posed.X_FL);
-    const double clear_distance = std::max(padding_, tree.interior_gap());
+    if (i < own.size()) padding = own[i];
+    const double clear_distance = std::max(padding, tree.interior_gap());
     const double size = tree.center().norm() + tree.radius() + clear_distance;
     Link link;
     link.number = i;
+    link.padding = padding;
     link.tree = posed.tree;
     link.solid = posed.solid;
     link.field = posed.field != nullptr && !posed.field->empty() ? posed.field : nullptr;
@@ -135,12 +136,12 @@ std::uint32_t SelfFilter::undecided_points_on_robot(const PointTile& tile) const
 
 // @param measured  bits of the points that are asked about
 std::uint32_t SelfFilter::points_on_link(const Link& link, const PointTile& tile,
-                                         std::uint32_t measured) const {
+                                         std::uint32_t measured) {
   std::uint32_t mask = 0;
   if (link.field != nullptr) {
     constexpr float kSteps = 4.0F;  // a place is rounded more often in float than a centre
     const FieldVerdict verdict =
-        test_by_field(*link.field, link.X_LO.cast<float>(), tile, static_cast<float>(padding_),
+        test_by_field(*link.field, link.X_LO.cast<float>(), tile, static_cast<float>(link.padding),
                       kSteps * link.rounding);
     mask = measured & verdict.on_robot;
     measured &= ~(verdict.on_robot | verdict.clear);
@@ -153,7 +154,7 @@ std::uint32_t SelfFilter::points_on_link(const Link& link, const PointTile& tile
   return mask;
 }
 
-bool SelfFilter::is_on_link(const Link& link, const Eigen::Vector3d& p_O) const {
+bool SelfFilter::is_on_link(const Link& link, const Eigen::Vector3d& p_O) {
   const Eigen::Vector3d p_L = link.X_LO * p_O;
   const Verdict verdict = test_spheres(Effort::kDecide, link, p_L, 0.0);
   return verdict == Verdict::kOnRobot ||
@@ -162,15 +163,15 @@ bool SelfFilter::is_on_link(const Link& link, const Eigen::Vector3d& p_O) const 
 
 // Tests all points within `radius` of a centre at once.
 SelfFilter::Verdict SelfFilter::test_spheres(Effort effort, const Link& link,
-                                             const Eigen::Vector3d& center_L, double radius) const {
+                                             const Eigen::Vector3d& center_L, double radius) {
   const Eigen::Vector3f c = center_L.cast<float>();
   const float near = link.clear_distance + static_cast<float>(radius) * (1.0F + 1e-6F);
-  const float held = static_cast<float>(padding_ - radius) - link.rounding;
+  const float held = static_cast<float>(link.padding - radius) - link.rounding;
   return ist::test_spheres(*link.tree, c.data(), near, held, effort == Effort::kProveClear);
 }
 
-bool SelfFilter::test_geometry(const Link& link, const Eigen::Vector3d& p_L) const {
-  if (is_within_distance(*link.solid, p_L, padding_)) return true;
+bool SelfFilter::test_geometry(const Link& link, const Eigen::Vector3d& p_L) {
+  if (is_within_distance(*link.solid, p_L, link.padding)) return true;
   // The point is farther from the surface than the padding: outside, which the tree may prove, or
   // deep inside.
   const double gap = link.tree->interior_gap();

@@ -32,6 +32,7 @@ class SelfFilter {
     const DistanceField* field;             ///< null: none
     Eigen::Isometry3d X_LO;                 ///< frame of the points -> link frame
     Eigen::Vector3f center_O;               ///< [m] of the link's bounding sphere
+    double padding;                         ///< [m]
     float padded_radius;                    ///< [m] of the bounding sphere, and the clear distance
     float rounding;                         ///< [m] more than what float rounds off
     float clear_distance;                   ///< [m] a cover distance above it proves a point clear
@@ -46,10 +47,12 @@ class SelfFilter {
   ///                 point is compared with those that it was measured at
   /// @param X_FO     frame of the points -> fixed frame
   /// @param padding  [m] >= 0
-  void set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3d& X_FO, double padding);
+  /// @param own      [m] >= 0, by solid: in place of `padding`; empty: none
+  void set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3d& X_FO, double padding,
+                 Span<const double> own = {});
 
   /// Whether a point is the robot's. @param p_O  [m]
-  bool is_on_link(const Link& link, const Eigen::Vector3d& p_O) const;
+  static bool is_on_link(const Link& link, const Eigen::Vector3d& p_O);
   const std::vector<Link>& links() const { return links_; }
   /// The links of the group that began last.
   const std::vector<const Link*>& group() const { return group_; }
@@ -75,14 +78,13 @@ class SelfFilter {
  private:
   static bool may_touch(const Link& link, const Eigen::Vector3f& center_O, float radius);
   enum class Effort { kProveClear, kDecide };
-  Verdict test_spheres(Effort effort, const Link& link, const Eigen::Vector3d& center_L,
-                       double radius) const;
-  bool test_geometry(const Link& link, const Eigen::Vector3d& p_L) const;
-  std::uint32_t points_on_link(const Link& link, const PointTile& tile,
-                               std::uint32_t measured) const;
+  static Verdict test_spheres(Effort effort, const Link& link, const Eigen::Vector3d& center_L,
+                              double radius);
+  static bool test_geometry(const Link& link, const Eigen::Vector3d& p_L);
+  static std::uint32_t points_on_link(const Link& link, const PointTile& tile,
+                                      std::uint32_t measured);
   Verdict test(const PaddedBox& box, std::uint32_t first, std::uint32_t last);
 
-  double padding_ = 0.0;
   std::vector<Link> links_;
   std::vector<const Link*> group_;      ///< links that points of the group may be on
   std::vector<const Link*> undecided_;  ///< the same of the box that was tested last

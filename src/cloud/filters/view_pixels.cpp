@@ -130,7 +130,7 @@ const SelfFilter::Link* ViewFilter::skin_of(std::size_t k, const TileView::Sight
   if (skin.verdict == SelfFilter::Verdict::kOnRobot) return links.back();
   const Eigen::Vector3d p_O = skin.X_OS * view_.p_S(k);
   const auto on = std::find_if(links.begin(), links.end(), [&](const SelfFilter::Link* link) {
-    return skin.filter.is_on_link(*link, p_O);
+    return SelfFilter::is_on_link(*link, p_O);
   });
   return on == links.end() ? nullptr : *on;
 }

@@ -379,6 +379,7 @@ void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,
                                           const ProximityArray* self,
                                           ist_proximity::JointRepulsion* message) {
   all_pushes_ = pushes_;
+  for (const std::size_t i : model_->paired) all_pushes_[i] = RepulsiveWrench();
   if (self_counts_) add_self_repulsion(self_problem.empty() ? self : nullptr);
   joint_repulsion_.fill(pose_source_.get(), all_pushes_, proximity, message);
   if (!self_counts_ || message->status != ProximityArray::OK) return;
@@ -388,10 +389,12 @@ void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,
   message->status_text = "link against link: " + (is_known ? self->status_text : self_problem);
 }
 
-/// @param self  of the monitored links, or null: not known
+/// @param self  of the monitored links, then of the paired ones; or null: not known
 void ProximityCycle::add_self_repulsion(const ProximityArray* self) {
-  for (std::size_t i = 0; i < model_->monitored.size(); ++i) {
-    RepulsiveWrench& push = all_pushes_[model_->monitored[i]];
+  const std::size_t monitored = model_->monitored.size();
+  for (std::size_t i = 0; i < monitored + model_->paired.size(); ++i) {
+    RepulsiveWrench& push =
+        all_pushes_[i < monitored ? model_->monitored[i] : model_->paired[i - monitored]];
     if (self == nullptr || i >= self->links.size()) {
       push = RepulsiveWrench::unknown();
       continue;

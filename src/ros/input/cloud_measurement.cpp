@@ -23,7 +23,8 @@ class CloudMeasurement : public Measurement {
     const RawCloud cloud =
         noise_ ? noise_->run(points_, ingest->config().max_range, &dropped) : points_;
     const std::chrono::duration<double> filtering = std::chrono::steady_clock::now() - begin;
-    ingest->run(cloud, placement.X_FS, placement.robot, header().stamp.toSec(), snapshot);
+    ingest->run(cloud, placement.X_FS, placement.robot, header().stamp.toSec(), snapshot,
+                placement.paddings);
     snapshot->counts.noise = dropped;
     snapshot->counts.not_a_number -= dropped;
     snapshot->ingest_time += filtering.count();

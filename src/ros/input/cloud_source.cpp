@@ -72,8 +72,8 @@ CloudSource::~CloudSource() {
 }
 
 void CloudSource::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                            const RegionOfInterest& region) {
-  state_.set_target(std::move(model), fixed_frame, region);
+                            const RegionOfInterest& region, const std::vector<bool>& filters) {
+  state_.set_target(std::move(model), fixed_frame, region, filters);
 }
 
 const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel>& model,

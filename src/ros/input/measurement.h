@@ -30,7 +30,8 @@ struct Placement {
   std::vector<PosedSolid> robot;
   /// By element of `robot`: the first and the last instant for which it stands.
   std::vector<std::pair<std::size_t, std::size_t>> robot_instants;
-  std::vector<bool> known;  ///< by link: at every instant; empty: no self-filter
+  std::vector<double> paddings;  ///< [m] by element of `robot`; empty: the usual one
+  std::vector<bool> known;       ///< by link: at every instant; empty: no self-filter
 };
 
 /// One checked message, whatever its type: it knows the instants whose transforms are needed, and

@@ -19,9 +19,10 @@ class ObstacleSource {
   virtual ~ObstacleSource() = default;
 
   /// Sets what the next clouds are transformed to, filtered with and cropped at. Thread safe.
-  /// @param model  null: clouds cannot be used
+  /// @param model    null: clouds cannot be used
+  /// @param filters  by link of the model: whether points on it are dropped
   virtual void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                         const RegionOfInterest& region) = 0;
+                         const RegionOfInterest& region, const std::vector<bool>& filters) = 0;
 
   /// The newest snapshot made with `model` since the clock's last jump; null: none. It is valid
   /// until the next call and never waits. One thread only. Call report() afterwards, which explains

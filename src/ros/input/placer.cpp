@@ -31,6 +31,8 @@ bool stays_in_place(const InnerSphereTree& tree, const Eigen::Isometry3d& X_FL,
 // before that.
 Placer::Placer(const SourceConfig& config, const TransformBuffer& buffer)
     : self_filter_(config.ingest.self_filter),
+      link_paddings_(config.link_paddings),
+      other_padding_(config.other_padding),
       patience_(0.8 * std::min(config.timeout, 1.0)),
       buffer_(buffer) {}
 
@@ -47,8 +49,10 @@ std::string Placer::missing_transform(const Measurement& measurement,
   }
   if (!self_filter_) return "";
   for (const ros::Time& time : {instants.front(), instants.back()}) {
-    for (const LinkModel& link : target.model->links) {
-      if (link.usable() && !is_known(buffer_, target.fixed_frame, link.name, time, &problem) &&
+    for (std::size_t i = 0; i < target.model->links.size(); ++i) {
+      const LinkModel& link = target.model->links[i];
+      if (link.usable() && target.filters[i] &&
+          !is_known(buffer_, target.fixed_frame, link.name, time, &problem) &&
           is_worth_waiting_for(link.name, target.fixed_frame, time)) {
         return "the self-filter waits: " + problem;
       }
@@ -70,12 +74,18 @@ bool Placer::is_worth_waiting_for(const std::string& link, const std::string& fi
          seconds_between(newest, now) < patience_;
 }
 
+double Placer::padding_of(const std::string& link) const {
+  const auto found = link_paddings_.find(link);
+  return found == link_paddings_.end() ? other_padding_ : found->second;
+}
+
 /// Adds the links whose poses are known at an instant, but for those that have not moved.
 void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, std::size_t instant,
                         FilterPoses* last, Placement* placement) const {
   const auto& links = target.model->links;
   std::string ignored;
   for (std::size_t i = 0; i < links.size(); ++i) {
+    if (!target.filters[i]) continue;
     // An exception per missing link and cloud would cost more than is_known().
     Eigen::Isometry3d X_FL;
     const bool known = links[i].usable() &&
@@ -92,6 +102,7 @@ void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, std:
     last->X_FL[i] = X_FL;
     last->solid[i] = placement->robot.size();
     placement->robot.push_back(posed_solid(links[i], X_FL));
+    if (!link_paddings_.empty()) placement->paddings.push_back(padding_of(links[i].name));
     placement->robot_instants.emplace_back(instant, instant);
   }
 }

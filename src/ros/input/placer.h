@@ -3,6 +3,7 @@
 #include <ros/time.h>
 
 #include <chrono>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -48,7 +49,11 @@ class Placer {
   void pose_robot(const SourceTarget& target, const ros::Time& stamp, std::size_t instant,
                   FilterPoses* last, Placement* placement) const;
 
+  double padding_of(const std::string& link) const;
+
   const bool self_filter_;
+  const std::map<std::string, double> link_paddings_;  ///< [m] see SourceConfig
+  const double other_padding_;                         ///< [m]
   const double patience_;  ///< [s] a cloud waits this long at most for one link's pose
   const TransformBuffer& buffer_;
   std::chrono::steady_clock::time_point target_since_;

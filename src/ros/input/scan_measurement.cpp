@@ -47,7 +47,7 @@ class ScanMeasurement : public Measurement {
     to_points(scan_, ranges_.min_range, ranges_.max_range,
               placement.X_FS.inverse() * placement.X_FS_end, &points, ranges_.sensor_range);
     ingest->run(points.raw(), placement.X_FS, robot_by_beam(placement), header().stamp.toSec(),
-                snapshot);
+                snapshot, placement.paddings);
     const Eigen::Vector3d moved = placement.X_FS_end.translation() - placement.X_FS.translation();
     if (!snapshot->extent.is_zero()) snapshot->extent.allow_for(moved.norm());
   }

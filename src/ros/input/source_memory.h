@@ -43,7 +43,8 @@ class SourceMemory : public ObstacleSource {
   void set_parent(const ObstacleSource* parent) { parent_ = parent; }
   const ObstacleSource* parent() const override { return parent_; }
   void set_model(std::shared_ptr<const RobotModel> /*model*/, const std::string& /*fixed_frame*/,
-                 const RegionOfInterest& /*region*/) override {}
+                 const RegionOfInterest& /*region*/,
+                 const std::vector<bool>& /*filters*/) override {}
 
   // The source's thread only.
 

@@ -29,11 +29,13 @@ SourceState::SourceState(const SourceConfig& config, const std::string& topic)
 }
 
 void SourceState::set_target(std::shared_ptr<const RobotModel> model,
-                             const std::string& fixed_frame, const RegionOfInterest& region) {
+                             const std::string& fixed_frame, const RegionOfInterest& region,
+                             const std::vector<bool>& filters) {
   const std::lock_guard<std::mutex> lock(mutex_);
   target_.model = std::move(model);
   target_.fixed_frame = fixed_frame;
   target_.region = region;
+  target_.filters = filters;
 }
 
 SourceTarget SourceState::target() {

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/region_of_interest.h"
@@ -24,6 +25,7 @@ struct SourceTarget {
   std::shared_ptr<const RobotModel> model;  ///< null: clouds cannot be used
   std::string fixed_frame;
   RegionOfInterest region;
+  std::vector<bool> filters;     ///< by link of the model: whether points on it are dropped
   std::uint64_t generation = 1;  ///< counts the backward jumps of the clock
   double set_back = 0.0;         ///< [s] all of them together
 };
@@ -39,7 +41,7 @@ class SourceState {
   SourceState(const SourceConfig& config, const std::string& topic);
 
   void set_target(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                  const RegionOfInterest& region);
+                  const RegionOfInterest& region, const std::vector<bool>& filters);
   SourceTarget target();
 
   /// Whether a snapshot was made with `model`, or one of the same geometry, since the clock's last

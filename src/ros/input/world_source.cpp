@@ -74,8 +74,8 @@ void WorldSource::subscribe(ros::NodeHandle* nh) {
 }
 
 void WorldSource::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                            const RegionOfInterest& region) {
-  state_.set_target(std::move(model), fixed_frame, region);
+                            const RegionOfInterest& region, const std::vector<bool>& filters) {
+  state_.set_target(std::move(model), fixed_frame, region, filters);
 }
 
 const SourceSnapshot* WorldSource::newest(const std::shared_ptr<const RobotModel>& model,

@@ -54,7 +54,7 @@ class WorldSource : public ObstacleSource {
   ~WorldSource() override;
 
   void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                 const RegionOfInterest& region) override;
+                 const RegionOfInterest& region, const std::vector<bool>& filters) override;
   const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model,
                                const ros::Time& time, double max_age) override;
   std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model,

@@ -97,7 +97,9 @@ void ContactLoader::begin(const ModelState& state) {
   ContactModel contacts;
   contacts.robot = state.robot;
   contacts.links.resize(robot.links.size());
-  for (const std::size_t i : state.monitored) {
+  std::vector<std::size_t> links = state.monitored;
+  links.insert(links.end(), state.paired.begin(), state.paired.end());
+  for (const std::size_t i : links) {
     const LinkDescription* link = find_link(model_->description(), robot.links[i].name);
     if (link == nullptr || !robot.links[i].usable()) continue;
     keys_[i] = contact_geometry_key(link->geometry, link->attached, ContactConfig());
@@ -123,7 +125,7 @@ bool ContactLoader::is_needed(const ModelState& state, std::size_t link) {
 bool ContactLoader::add_next(const ModelState& state) {
   const auto contacts = this->contacts();
   std::optional<std::size_t> next;
-  for (const std::size_t i : state.monitored) {
+  for (std::size_t i = 0; i < keys_.size(); ++i) {
     if (keys_[i].empty() || contacts->links[i] || !is_needed(state, i)) continue;
     if (!next || needed_[i] < needed_[*next]) next = i;
   }

@@ -32,11 +32,6 @@ void add_name(const std::string& name, std::vector<std::string>* names) {
   if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
 }
 
-bool any_self_filter(const std::vector<SourceConfig>& sources) {
-  return std::any_of(sources.begin(), sources.end(),
-                     [](const SourceConfig& source) { return source.ingest.self_filter; });
-}
-
 }  // namespace
 
 ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)
@@ -83,6 +78,7 @@ std::string ModelLoader::reload(bool* found) {
     state->anytime = nullptr;
     state->repulsion = nullptr;
     state->monitored.clear();
+    state->paired.clear();
     state_ = std::move(state);
     reload_ = true;
   }
@@ -171,37 +167,67 @@ void ModelLoader::load_once() {
   }
 }
 
-/// Adds the links that only the self-filter needs: it drops points on the whole robot.
-RobotModelConfig ModelLoader::model_config(const RobotDescription& description,
-                                           const std::vector<AttachedObject>& objects) const {
+/// Reads the SRDF beside the URDF, where there is one.
+void ModelLoader::read_rules(ModelState* state) const {
+  std::string key, srdf;
+  if (!nh_.searchParam(config_.robot_description + "_semantic", key) || !nh_.getParam(key, srdf)) {
+    return;
+  }
+  try {
+    state->rules = read_srdf(srdf, state->kinematics.get());
+    for (const std::string& doubt : state->rules.doubts) {
+      state->warnings.push_back("'" + key + "': " + doubt);
+    }
+  } catch (const ModelError& error) {
+    state->warnings.push_back("'" + key + "' is not used: " + error.what());
+  }
+}
+
+/// Chooses what the links are used for.
+void ModelLoader::choose(ModelState* state) const {
+  const RobotDescription& description = *state->description;
+  std::vector<CoarseHull> hulls;
+  if (state->kinematics) hulls = coarse_hulls(description, [this] { return cancelled(); });
+  state->choice = choose_links(description, state->rules, hulls, config_);
+  state->links = state->choice.monitored;
+  for (const std::string& text : state->choice.warnings) state->warnings.push_back(text);
+  if (!state->choice.remarks.empty()) ROS_INFO_STREAM(state->choice.remarks);
+}
+
+/// The configuration of the links that anything is asked of.
+RobotModelConfig ModelLoader::model_config(const ModelState& state) const {
   RobotModelConfig config = config_.model;
-  if (config.links.empty()) return config;
-  for (const AttachedObject& object : objects) add_name(object.link, &config.links);
-  if (!any_self_filter(config_.sources)) return config;
-  std::vector<std::string> links = monitored_links(description, {});
-  for (const std::string& name : config.links) add_name(name, &links);
-  config.links = links;
+  config.links = state.choice.packed();
+  for (const AttachedObject& object : state.objects) add_name(object.link, &config.links);
   return config;
 }
 
 /// Completes a state whose robot is built, or a part of it.
-void ModelLoader::take_robot(const RobotDescription& description, const AnytimeModel::Ptr& made,
-                             ModelState* state) const {
+void ModelLoader::take_robot(const AnytimeModel::Ptr& made, ModelState* state) {
   state->anytime = made;
   state->robot = made->robot();
-  std::vector<std::string> wanted = config_.model.links;
-  if (!wanted.empty()) {
-    for (const AttachedObject& object : state->objects) add_name(object.link, &wanted);
+  // What carries an attached object is monitored, and the object is a part of the robot.
+  LinkChoice choice = state->choice;
+  for (const AttachedObject& object : state->objects) {
+    add_name(object.link, &choice.monitored);
+    add_name(object.link, &choice.filtering);
   }
-  const std::vector<std::string> names = monitored_links(description, wanted);
-  const std::set<std::string> monitored(names.begin(), names.end());
+  const std::set<std::string> monitored(choice.monitored.begin(), choice.monitored.end());
+  const std::set<std::string> paired(choice.paired.begin(), choice.paired.end());
+  const std::set<std::string> filtering(choice.filtering.begin(), choice.filtering.end());
   state->links.clear();
   state->monitored.clear();
+  state->paired.clear();
+  state->filters.clear();
   for (std::size_t i = 0; i < state->robot->links.size(); ++i) {
     const std::string& name = state->robot->links[i].name;
-    if (monitored.count(name) == 0) continue;
-    state->monitored.push_back(i);
-    state->links.push_back(name);
+    state->filters.push_back(filtering.count(name) > 0);
+    if (monitored.count(name) > 0) {
+      state->monitored.push_back(i);
+      state->links.push_back(name);
+    } else if (paired.count(name) > 0) {
+      state->paired.push_back(i);
+    }
   }
   if (!state->usage || state->usage->size() != state->robot->links.size()) {
     state->usage = std::make_shared<LinkUsage>(state->robot->links.size());
@@ -246,6 +272,14 @@ void ModelLoader::load(const std::string& urdf) {
                  [this](const std::string& link, const std::string& mesh) {
                    return show_reading(link, mesh);
                  }));
+  try {
+    state.kinematics = std::make_shared<const Kinematics>(*state.description);
+  } catch (const ModelError& error) {
+    state.kinematics_problem = error.what();
+    ROS_WARN_STREAM("link poses cannot be computed from joint states: " << error.what());
+  }
+  read_rules(&state);
+  choose(&state);
   auto carrying = std::make_shared<const RobotDescription>(carry_over_objects(&state));
   if (state.objects.empty()) carrying = state.description;  // the same meshes once
   const RobotDescription& description = *carrying;
@@ -253,17 +287,12 @@ void ModelLoader::load(const std::string& urdf) {
   state.phase = ModelState::Phase::kPacking;
   state.problem = "packing of the robot '" + description.name + "' begins";
   state.root_link = description.root_link;
-  state.links = monitored_links(description, config_.model.links);
-  state.warnings = doubtful_sizes(description, model_config(description, state.objects).links);
+  for (std::string& doubt : doubtful_sizes(description, model_config(state).links)) {
+    state.warnings.push_back(std::move(doubt));
+  }
   const std::string no_limits = doubtful_limits(description);
   if (!no_limits.empty()) state.warnings.push_back(no_limits);
   for (const std::string& doubt : state.warnings) ROS_WARN_STREAM(doubt);
-  try {
-    state.kinematics = std::make_shared<const Kinematics>(description);
-  } catch (const ModelError& error) {
-    state.kinematics_problem = error.what();
-    ROS_WARN_STREAM("link poses cannot be computed from joint states: " << error.what());
-  }
   set_state(state);
 
   const auto begin = std::chrono::steady_clock::now();
@@ -315,14 +344,13 @@ bool ModelLoader::build(const std::shared_ptr<const RobotDescription>& descripti
   // Links answer as they get ready.
   const auto partial = [&](const AnytimeModel::Ptr& made) {
     const std::lock_guard<std::mutex> lock(report_mutex);
-    take_robot(*description, made, state);
+    take_robot(made, state);
     set_state(*state);
   };
-  const AnytimeModel::Ptr made =
-      AnytimeModel::build(description, model_config(*description, state->objects),
-                          AnytimeModel::Stage::kFirst, callbacks, partial);
+  const AnytimeModel::Ptr made = AnytimeModel::build(
+      description, model_config(*state), AnytimeModel::Stage::kFirst, callbacks, partial);
   if (!made) return false;
-  take_robot(*description, made, state);
+  take_robot(made, state);
   return true;
 }
 

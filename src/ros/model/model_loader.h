@@ -74,10 +74,10 @@ class ModelLoader {
   bool change_cancelled() const;
   std::string why_cancelled() const;
   bool show_reading(const std::string& link, const std::string& mesh);
-  RobotModelConfig model_config(const RobotDescription& description,
-                                const std::vector<AttachedObject>& objects) const;
-  void take_robot(const RobotDescription& description, const AnytimeModel::Ptr& made,
-                  ModelState* state) const;
+  void read_rules(ModelState* state) const;
+  void choose(ModelState* state) const;
+  RobotModelConfig model_config(const ModelState& state) const;
+  static void take_robot(const AnytimeModel::Ptr& made, ModelState* state);
   void finish(const RobotDescription& description, ModelState* state) const;
   RobotDescription carry_over_objects(ModelState* state);
   void set_state(ModelState state);

@@ -151,11 +151,11 @@ std::string ModelLoader::change_objects(const std::shared_ptr<const ModelState>&
   try {
     const auto description =
         std::make_shared<const RobotDescription>(with_objects(*state->description, next.objects));
-    const AnytimeModel::Ptr made = state->anytime->with_link(
-        description, link, model_config(*description, next.objects), callbacks);
+    const AnytimeModel::Ptr made =
+        state->anytime->with_link(description, link, model_config(next), callbacks);
     is_made = made != nullptr;
     if (is_made) {
-      take_robot(*description, made, &next);
+      take_robot(made, &next);
       finish(*description, &next);
     }
   } catch (const ModelError& error) {

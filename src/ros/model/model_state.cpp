@@ -31,6 +31,17 @@ std::vector<bool> wanted_links(const ModelState& model) {
   return wanted;
 }
 
+std::shared_ptr<const ModelState> with_paired(std::shared_ptr<const ModelState> model) {
+  if (model->paired.empty()) return model;
+  auto result = std::make_shared<ModelState>(*model);
+  for (const std::size_t i : model->paired) {
+    result->monitored.push_back(i);
+    result->links.push_back(model->robot->links[i].name);
+  }
+  result->paired.clear();
+  return result;
+}
+
 std::vector<std::string> monitored_links(const RobotDescription& description,
                                          const std::vector<std::string>& wanted) {
   std::unordered_set<std::string> candidates(wanted.begin(), wanted.end());
@@ -49,6 +60,7 @@ std::vector<std::string> monitored_links(const RobotDescription& description,
 std::string link_counts(const ModelState& state) {
   std::size_t monitored = 0, packed = 0;
   for (const LinkModel& link : state.robot->links) packed += link.usable() ? 1 : 0;
+  for (const std::size_t i : state.paired) packed -= state.robot->links[i].usable() ? 1 : 0;
   for (const std::size_t i : state.monitored) {
     monitored += state.robot->links[i].usable() ? 1 : 0;
   }

@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "internal/robot/anytime_model.h"
+#include "ist_proximity/proximity/collision_rules.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "ros/model/link_choice.h"
 #include "ros/model/link_usage.h"
 #include "ros/parameters/parameters.h"
 
@@ -30,8 +32,11 @@ struct ModelState {
   std::string root_link;              ///< empty until the URDF is known
   std::vector<std::string> links;     ///< monitored, in URDF order; known from kPacking on
   std::vector<std::string> warnings;  ///< given by packing
-  /// Known when ready, and while packing with links that are pending. It holds every link with
-  /// geometry, because the self-filter needs them all, not only the monitored ones.
+  /// Known from kPacking on.
+  CollisionRules rules;  ///< of the SRDF
+  LinkChoice choice;
+  /// Known when ready, and while packing with links that are pending. It holds the links that are
+  /// monitored, and others that self-filters and link pairs need.
   std::shared_ptr<const RobotModel> robot;
   /// Known with `robot`: where that comes from, and what finer packings are made of.
   AnytimeModel::Ptr anytime;
@@ -40,6 +45,8 @@ struct ModelState {
   /// Known with `robot`; states of one robot share it.
   std::shared_ptr<LinkUsage> usage;
   std::vector<std::size_t> monitored;  ///< known with `robot`: indices into robot->links
+  std::vector<bool> filters;           ///< known with `robot`, by link: whether self-filters use it
+  std::vector<std::size_t> paired;     ///< the same of LinkChoice::paired
   std::shared_ptr<const Kinematics>
       kinematics;                  ///< known from kPacking on; null where it is faulty
   std::string kinematics_problem;  ///< why `kinematics` is null
@@ -65,6 +72,10 @@ std::vector<std::string> link_names(const RobotModel& robot);
 
 /// By link of model.robot: true for monitored links with usable geometry, whose poses are needed.
 std::vector<bool> wanted_links(const ModelState& model);
+
+/// The state with the links of ~self_proximity for monitored ones: after those, the paired ones.
+/// @param model  not null; itself the result where nothing is paired
+std::shared_ptr<const ModelState> with_paired(std::shared_ptr<const ModelState> model);
 
 /// Chooses the monitored links, in the order in which the model has them.
 /// @param wanted  empty: every link with geometry. Names that the URDF lacks go to the end

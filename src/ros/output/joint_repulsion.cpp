@@ -7,10 +7,12 @@ namespace ist {
 JointRepulsion::JointRepulsion(const ModelState& model)
     : kinematics_(model.kinematics), problem_(no_kinematics(model)) {
   if (!kinematics_) return;
-  for (const std::size_t i : model.monitored) {
+  std::vector<std::size_t> links = model.monitored;
+  links.insert(links.end(), model.paired.begin(), model.paired.end());
+  for (const std::size_t i : links) {
     const auto found = kinematics_->find_body(model.robot->links[i].name);
     if (!found) continue;  // the URDF lacks this configured link, so nothing moves it
-    monitored_.push_back(i);
+    links_.push_back(i);
     index_.push_back(*found);
   }
 }
@@ -32,7 +34,7 @@ void JointRepulsion::fill(PoseSource* source, const std::vector<RepulsiveWrench>
   const auto& joints = kinematics_->joints();
   effort_.setZero(static_cast<Eigen::Index>(joints.size()));
   for (std::size_t i = 0; i < index_.size(); ++i) {
-    const std::string why = add(index_[i], pushes[monitored_[i]]);
+    const std::string why = add(index_[i], pushes[links_[i]]);
     if (why.empty() || message->status != ist_proximity::ProximityArray::OK) continue;
     message->status = ist_proximity::ProximityArray::NO_POSE;
     message->status_text = why;

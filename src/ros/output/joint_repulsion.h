@@ -40,7 +40,7 @@ class JointRepulsion {
 
   std::shared_ptr<const Kinematics> kinematics_;  ///< null where the URDF's is faulty
   std::string problem_;                           ///< the sentence where kinematics_ is null
-  std::vector<std::size_t> monitored_;            ///< indices of links of the robot
+  std::vector<std::size_t> links_;                ///< indices of links of the robot
   std::vector<std::size_t> index_;                ///< their bodies
 
   // Valid for one call, by body and by joint of the kinematics.

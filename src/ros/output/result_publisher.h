@@ -23,8 +23,9 @@ class ResultPublisher {
   /// The summary of the whole robot's distances.
   SpeedScalePublisher& summary() { return summary_; }
   /// Sets which links count, in the summary and as the nearest one of the markers.
-  void set_links(const CountedLinks& links) {
-    summary_.set_links(links);
+  /// @param self  the same in ~self_proximity
+  void set_links(const CountedLinks& links, const CountedLinks& self) {
+    summary_.set_links(links, self);
     marker_drawer_.set_counts(links.counts);
   }
 

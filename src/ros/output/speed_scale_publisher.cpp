@@ -42,20 +42,18 @@ std::vector<SpeedScaleInput> inputs_of(const ProximityArray& result) {
   return inputs;
 }
 
-std::string unknown_text(const SpeedScaleAnswer& answer, const CountedLinks& links,
-                         const ProximityArray& result) {
+std::string unknown_text(const SpeedScaleAnswer& answer, const ProximityArray& result) {
   std::string what = "nothing is known of the robot's links";
   if (answer.link >= 0) {
-    what = "'" + links.links[static_cast<std::size_t>(answer.link)] + "' is UNKNOWN";
+    what = "'" + result.links[static_cast<std::size_t>(answer.link)].link + "' is UNKNOWN";
   }
   return "stop: " + what + (result.status_text.empty() ? "" : ": " + result.status_text);
 }
 
 }  // namespace
 
-std::string speed_scale_text(const SpeedScaleAnswer& answer, const CountedLinks& links,
-                             const ProximityArray& result) {
-  if (answer.rule == SpeedRule::kUnknown) return unknown_text(answer, links, result);
+std::string speed_scale_text(const SpeedScaleAnswer& answer, const ProximityArray& result) {
+  if (answer.rule == SpeedRule::kUnknown) return unknown_text(answer, result);
   const auto& link = result.links[static_cast<std::size_t>(answer.link)];
   const std::string near = "'" + link.link + "' is " + metres(link.lower_bound) + " or more from " +
                            (link.source.empty() ? "obstacles" : "'" + link.source + "'");
@@ -88,9 +86,10 @@ SpeedScalePublisher::SpeedScalePublisher(ros::NodeHandle private_nh, const Serve
   state_publisher_ = private_nh.advertise<SpeedScaleState>("speed_scale_state", 10);
 }
 
-void SpeedScalePublisher::set_links(const CountedLinks& links) {
+void SpeedScalePublisher::set_links(const CountedLinks& links, const CountedLinks& self) {
   if (links.links != links_.links) scale_ = SpeedScale(links.links);
   links_ = links;
+  self_links_ = self;
 }
 
 bool SpeedScalePublisher::is_usable(const ProximityArray& result) const {
@@ -98,7 +97,7 @@ bool SpeedScalePublisher::is_usable(const ProximityArray& result) const {
 }
 
 bool SpeedScalePublisher::is_fresh(const ProximityArray* self, const ros::Time& now) const {
-  return self && are_links_of(*self, links_) &&
+  return self && are_links_of(*self, self_links_) &&
          seconds_between(self->header.stamp, now) <= pose_timeout_;
 }
 
@@ -113,7 +112,7 @@ void SpeedScalePublisher::publish(const ProximityArray& result, const ProximityA
   min_distance_ = std::numeric_limits<double>::quiet_NaN();
   if (is_known) min_distance_ = ist::min_distance(result, links_.counts);
   if (is_known && self_counts_) {
-    const double own = ist::min_distance(*self, links_.counts);
+    const double own = ist::min_distance(*self, self_links_.counts);
     min_distance_ = std::isnan(own) ? own : std::min(min_distance_, own);  // keeps NaN
   }
   if (is_enabled_) {
@@ -138,9 +137,9 @@ void SpeedScalePublisher::find_scale(const ProximityArray& result, const Proximi
   if (!is_usable(result) || !self_problem_.empty()) return;
   answer_ = scale_.update(config, inputs_of(result), links_.counts, oldest_age(result, now));
   if (!self || answer_.rule == SpeedRule::kUnknown) return;
-  SpeedScale own_scale(links_.links);  // without hysteresis it remembers nothing
+  SpeedScale own_scale(self_links_.links);  // without hysteresis it remembers nothing
   const SpeedScaleAnswer own =
-      own_scale.update(between_links(config), inputs_of(*self), links_.counts, 0.0);
+      own_scale.update(between_links(config), inputs_of(*self), self_links_.counts, 0.0);
   if (own.rule != SpeedRule::kUnknown && own.scale >= answer_.scale) return;
   answer_ = own;
   decisive_ = self;
@@ -164,7 +163,7 @@ void SpeedScalePublisher::fill_state(const ProximityArray& result, const SpeedSc
   state->rule = static_cast<std::uint8_t>(answer_.rule);
   state->stop_distance = answer_.stop_distance;
   state->free_distance = answer_.free_distance;
-  state->text = speed_scale_text(answer_, links_, *decisive_);
+  state->text = speed_scale_text(answer_, *decisive_);
   if (!self_problem_.empty()) state->text = "stop: " + self_problem_;
   const std::vector<std::string> unknown = scale_.unknown_links(config);
   if (!unknown.empty() && !links_.links.empty()) {
@@ -182,7 +181,7 @@ std::string SpeedScalePublisher::summary() const {
   constexpr const char* kRules[] = {"not known", "stop", "slow", "free", "separation"};
   std::string text = format_text("%.2f, ", answer_.scale);
   text += kRules[static_cast<std::size_t>(answer_.rule)];
-  if (answer_.link >= 0) text += ", " + links_.links[static_cast<std::size_t>(answer_.link)];
+  if (answer_.link >= 0) text += ", " + self_links_.links[static_cast<std::size_t>(answer_.link)];
   return text;
 }
 

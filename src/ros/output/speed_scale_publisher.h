@@ -24,7 +24,8 @@ class SpeedScalePublisher {
   SpeedScalePublisher(ros::NodeHandle private_nh, const ServerConfig& config);
 
   /// Sets the links of the messages to come; hysteresis starts again where their names are others.
-  void set_links(const CountedLinks& links);
+  /// @param self  of ~self_proximity
+  void set_links(const CountedLinks& links, const CountedLinks& self);
   /// Forgets what hysteresis holds, after a jump of the clock.
   void forget() { scale_.reset(); }
 
@@ -57,7 +58,7 @@ class SpeedScalePublisher {
   const double pose_timeout_;          ///< [s]
   std::set<std::string> never_stale_;  ///< names of sources that stand still
   ros::Publisher min_publisher_, scale_publisher_, state_publisher_;
-  CountedLinks links_;
+  CountedLinks links_, self_links_;
   SpeedScale scale_;
   SpeedScaleAnswer answer_;
   /// The message that holds the link that decides; null: none does. Valid within publish().
@@ -68,8 +69,7 @@ class SpeedScalePublisher {
 
 /// The sentence about a scale.
 /// @param result  the message that holds the link that decides
-/// @param links   of the message
-std::string speed_scale_text(const SpeedScaleAnswer& answer, const CountedLinks& links,
+std::string speed_scale_text(const SpeedScaleAnswer& answer,
                              const ist_proximity::ProximityArray& result);
 
 }  // namespace ist

@@ -71,6 +71,16 @@ bool limit_influence(LiveConfig* config) {
   return is_more;
 }
 
+/// One of two words, or the names of links.
+void read_filter_links(ParameterReader* reader, ServerConfig* config) {
+  const std::string name = "self_filter_links";
+  if (reader->type(name) == XmlRpc::XmlRpcValue::TypeString) {
+    reader->read({name, choice(&config->self_filter_all, {"monitored", "all"})});
+  } else {
+    reader->read({name, &config->self_filter_links});
+  }
+}
+
 void check_model(ParameterReader* reader, const ServerConfig& config) {
   if (config.robot_description.empty()) {
     reader->add_error("robot_description", "is empty: the name of the parameter with the URDF");
@@ -268,6 +278,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   ServerConfig config;
   config.model.cache_directory = default_cache_directory();
   reader.read_all(startup_parameters(&config));
+  read_filter_links(&reader, &config);
   check_model(&reader, config);
   config.speed_scale = unread_speed_scale(&reader, config.query.max_distance);
   reader.read_all(live_parameters(&config));

@@ -86,6 +86,9 @@ struct ServerConfig : LiveConfig {
   double rate = 100.0;        ///< [Hz] of ~proximity with kTf; > 0
   GeometrySource geometry = GeometrySource::kCollision;
   RobotModelConfig model;
+  /// Links whose points self-filters drop. Empty: all with geometry, or the monitored ones.
+  std::vector<std::string> self_filter_links;
+  bool self_filter_all = false;
   int max_query_answers = 100000;  ///< states times links of one ~query: 60 MB; > 0
   ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   SelfCollisionConfig self_collision;

@@ -95,6 +95,10 @@ struct SourceConfig {
   double frozen_after = std::numeric_limits<double>::infinity();
   double depth_unit = 0.0;  ///< [m] of depth images: that a number of 1 means; 0: the encoding's
   IngestConfig ingest;
+  /// [m] self_filter_padding by link, where it is a dictionary; of other links `other_padding`.
+  /// Used with kPadding. ingest.self_filter_padding is the largest.
+  std::map<std::string, double> link_paddings;
+  double other_padding = 0.0;
   NoiseFilterConfig noise;    ///< used for clouds and depth images
   ScanLimits scan;            ///< used for scans
   OctreeLimits map;           ///< used for maps

@@ -1,5 +1,6 @@
 #include "ros/parameters/source_parameters.h"
 
+#include <algorithm>
 #include <limits>
 #include <map>
 #include <string>
@@ -27,7 +28,6 @@ std::vector<Parameter> sensor_parameters(const std::string& at, SourceConfig* so
       {at + "min_measured", &source->min_measured, {"", 0.0, 1.0}},
       {at + "frozen_after", &source->frozen_after, kTime},
       {at + "self_filter", &ingest.self_filter},
-      {at + "self_filter_padding", &ingest.self_filter_padding, kMetre},
       {at + "self_filter_mode", choice(&ingest.self_filter_mode, {"padding", "view"})},
       {at + "self_filter_view/noise_constant", &view.noise.constant, kMetre},
       {at + "self_filter_view/noise_quadratic", &view.noise.quadratic,
@@ -40,6 +40,24 @@ std::vector<Parameter> sensor_parameters(const std::string& at, SourceConfig* so
 std::vector<Parameter> noise_filter_parameters(const std::string& at, NoiseFilterConfig* noise) {
   return {{at + "noise_filter/radius", &noise->radius, kMetre},
           {at + "noise_filter/neighbors", &noise->neighbors, {"", 1.0, 1000.0}}};
+}
+
+/// Reads a number, or a dictionary of links in which `default` stands for all others.
+void read_padding(ParameterReader* reader, const std::string& name, SourceConfig* source) {
+  double* const largest = &source->ingest.self_filter_padding;
+  if (reader->type(name) != XmlRpc::XmlRpcValue::TypeStruct) {
+    if (reader->has(name)) source->link_paddings.clear();
+    return reader->read({name, largest, kMetre});
+  }
+  if (source->link_paddings.empty()) source->other_padding = *largest;
+  source->link_paddings.clear();
+  for (const std::string& link : reader->children(name)) {
+    reader->read({name + "/" + link,
+                  link == "default" ? &source->other_padding : &source->link_paddings[link],
+                  kMetre});
+  }
+  *largest = source->other_padding;
+  for (const auto& [link, padding] : source->link_paddings) *largest = std::max(*largest, padding);
 }
 
 /// The table of a memory. The limits are those of MemoryConfig; 10^9 voxels take 8.6 GB.
@@ -73,6 +91,8 @@ void read_sensor(ParameterReader* reader, const std::string& at, SourceConfig* s
   IngestConfig& ingest = source->ingest;
   const double default_max_range = ingest.max_range;
   reader->read_all(sensor_parameters(at, source));
+  read_padding(reader, at + "self_filter_padding", source);
+  if (ingest.self_filter_mode == SelfFilterMode::kView) source->link_paddings.clear();
   if (ingest.max_range > ingest.min_range) return;
   reader->add_error(at + "max_range", format_text("is %g m: it must be more than min_range, which "
                                                   "is %g m",

@@ -34,9 +34,8 @@ std::string text_of(const std::vector<SampledPair>& sampled, std::size_t configu
 
 }  // namespace
 
-LinkPairService::LinkPairService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
-                                 const ServerConfig& config)
-    : config_(config), nh_(nh) {
+LinkPairService::LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config)
+    : config_(config) {
   private_nh.setCallbackQueue(callbacks_.queue());
   service_ = private_nh.advertiseService("link_pairs", &LinkPairService::answer, this);
   callbacks_.start("ist link pairs");
@@ -85,7 +84,7 @@ void LinkPairService::sample_newest() {
   }
   const auto& model = findings.model;
   if (!model || !model->is_ready() || !model->kinematics) return;
-  findings.chosen = choose_pairs(nh_, config_, *model, [&] { return is_outdated(*model); }).all;
+  findings.chosen = choose_pairs(config_, model, [&] { return is_outdated(*model); }).all;
   findings.problem = "the pairs are being sampled";
   const auto show = [&] {
     const std::lock_guard<std::mutex> lock(mutex_);

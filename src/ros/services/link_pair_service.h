@@ -23,8 +23,7 @@ namespace ist {
 /// the cache. Sampling informs; it leaves no pair out.
 class LinkPairService {
  public:
-  LinkPairService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
-                  const ServerConfig& config);
+  LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config);
   ~LinkPairService();
 
   /// Thread safe.
@@ -49,7 +48,6 @@ class LinkPairService {
   bool answer(Service::Request& request, Service::Response& response);
 
   const ServerConfig config_;
-  ros::NodeHandle nh_;
   CallbackThread callbacks_;
   ros::ServiceServer service_;
   StopSignal stop_signal_;    ///< a new model is its event

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <tuple>
 
-#include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/collision_rules.h"
 #include "ros/common/text.h"
 
@@ -16,21 +15,6 @@ bool holds(const std::vector<LinkPair>& pairs, const LinkPair& pair) {
       pairs.begin(), pairs.end(), pair, [](const LinkPair& one, const LinkPair& other) {
         return std::tie(one.first, one.second) < std::tie(other.first, other.second);
       });
-}
-
-CollisionRules srdf_rules(const ros::NodeHandle& nh, const ServerConfig& config,
-                          const Kinematics& kinematics, std::vector<std::string>* warnings) {
-  const std::string name = config.robot_description + "_semantic";
-  std::string key, srdf;
-  if (!nh.searchParam(name, key) || !nh.getParam(key, srdf)) return {};
-  try {
-    CollisionRules rules = read_srdf(srdf, &kinematics);
-    for (const std::string& doubt : rules.doubts) warnings->push_back("'" + key + "': " + doubt);
-    return rules;
-  } catch (const ModelError& error) {
-    warnings->push_back("'" + key + "' is not used: " + error.what());
-  }
-  return {};
 }
 
 std::vector<std::string> unknown_names(const ServerConfig& config, const Kinematics& kinematics) {
@@ -74,12 +58,15 @@ std::string PairChoice::text(const RobotModel& robot) const {
          join(at_rest, ", ");
 }
 
-PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
-                        const ModelState& model, const std::function<bool()>& cancelled) {
+PairChoice choose_pairs(const ServerConfig& config,
+                        const std::shared_ptr<const ModelState>& monitoring,
+                        const std::function<bool()>& cancelled) {
+  const auto with_hulls = with_paired(monitoring);
+  const ModelState& model = *with_hulls;
   PairChoice choice;
   const RobotModel& robot = *model.robot;
   choice.warnings = unknown_names(config, *model.kinematics);
-  const CollisionRules rules = srdf_rules(nh, config, *model.kinematics, &choice.warnings);
+  const CollisionRules& rules = model.rules;
   CollisionRules only_enabled;  // which may be of adjacent links
   only_enabled.enabled = rules.enabled;
   const std::vector<bool> wanted = wanted_links(model);

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <ros/node_handle.h>
-
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,7 +20,7 @@ struct ChosenPair {
   PairReason reason;
 };
 
-/// Decides about every pair of monitored links.
+/// Decides about every pair of links of ~self_proximity, see with_paired().
 struct PairChoice {
   std::vector<ChosenPair> all;
   std::vector<std::string> warnings;  ///< one sentence each
@@ -30,11 +29,11 @@ struct PairChoice {
   std::string text(const RobotModel& robot) const;  ///< a sentence for the log
 };
 
-/// @param nh     namespace in which, and above which, `robot_description_semantic` is searched
-/// @param model  ready, with kinematics
+/// @param monitoring  the model: ready, with kinematics
 /// @param cancelled  asked now and then; true ends the work, whose result is of no use then. May be
 ///                   empty
-PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
-                        const ModelState& model, const std::function<bool()>& cancelled = {});
+PairChoice choose_pairs(const ServerConfig& config,
+                        const std::shared_ptr<const ModelState>& monitoring,
+                        const std::function<bool()>& cancelled = {});
 
 }  // namespace ist

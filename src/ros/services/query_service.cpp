@@ -39,16 +39,15 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 
 }  // namespace
 
-QueryService::QueryService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
-                           const ServerConfig& config, const CloudSources& sources,
-                           const TransformBuffer& buffer, std::function<LiveConfig()> live,
-                           UnknownSpaceWatch* watch)
+QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
+                           const CloudSources& sources, const TransformBuffer& buffer,
+                           std::function<LiveConfig()> live, UnknownSpaceWatch* watch)
     : config_(config),
       sources_(sources),
       buffer_(buffer),
       live_(std::move(live)),
       watch_(watch),
-      self_(nh, config) {
+      self_(config) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
   thread_.start("ist query", [this] { return_memory(); });

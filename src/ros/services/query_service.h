@@ -31,10 +31,9 @@ class QueryService {
   /// @param sources, buffer  outlive this
   /// @param watch            outlives this; null with ~unknown_space free
   /// @param live             gives the present configuration; called from the service's thread
-  /// @param nh               namespace in which, and above which, an SRDF is searched
-  QueryService(const ros::NodeHandle& nh, ros::NodeHandle private_nh, const ServerConfig& config,
-               const CloudSources& sources, const TransformBuffer& buffer,
-               std::function<LiveConfig()> live, UnknownSpaceWatch* watch = nullptr);
+  QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const CloudSources& sources,
+               const TransformBuffer& buffer, std::function<LiveConfig()> live,
+               UnknownSpaceWatch* watch = nullptr);
   ~QueryService();
 
   /// Thread safe.

@@ -23,10 +23,10 @@ using ist_proximity::ProximityArray;
 using ist_proximity::ProximityArrayConstPtr;
 using Clock = std::chrono::steady_clock;
 
-SelfProximity::SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
-                             const ServerConfig& config, const TransformBuffer& buffer,
-                             JointStateListener* joints, std::function<LiveConfig()> live)
-    : config_(config), nh_(nh), buffer_(buffer), joints_(joints), live_(std::move(live)) {
+SelfProximity::SelfProximity(ros::NodeHandle private_nh, const ServerConfig& config,
+                             const TransformBuffer& buffer, JointStateListener* joints,
+                             std::function<LiveConfig()> live)
+    : config_(config), buffer_(buffer), joints_(joints), live_(std::move(live)) {
   publisher_ = private_nh.advertise<ProximityArray>("self_proximity", 10);
   thread_ = std::thread(&SelfProximity::run, this);
 }
@@ -38,7 +38,7 @@ SelfProximity::~SelfProximity() {
 
 void SelfProximity::set_model(std::shared_ptr<const ModelState> model) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  newest_model_ = std::move(model);
+  newest_model_ = with_paired(std::move(model));
 }
 
 ProximityArrayConstPtr SelfProximity::newest() const {
@@ -110,7 +110,7 @@ void SelfProximity::take_model() {
 }
 
 std::vector<LinkPair> SelfProximity::watched_pairs() const {
-  const PairChoice choice = choose_pairs(nh_, config_, *model_, is_stopped_);
+  const PairChoice choice = choose_pairs(config_, model_, is_stopped_);
   for (const std::string& warning : choice.warnings) ROS_WARN_STREAM(warning);
   ROS_INFO_STREAM(choice.text(*model_->robot));
   return choice.watched();

@@ -25,15 +25,14 @@ namespace ist {
 
 /// Measures link against link: publishes ~self_proximity at ~self_collision/rate of the wall clock,
 /// from a thread of its own. Pairs are left out when one joint or fixed joints alone connect them,
-/// when ~self_collision/ignore names them, when the SRDF in robot_description_semantic disables
-/// them (<disable_collisions>), and when they are in contact at rest.
+/// when ~self_collision/ignore names them, when the SRDF disables them (CollisionRules), and when
+/// they are in contact at rest. Its links are the monitored ones, and then the paired ones.
 class SelfProximity {
  public:
-  /// @param nh       namespace in which, and above which, `robot_description_semantic` is searched
   /// @param buffer   outlives this
   /// @param joints   outlives this; null: link poses come from the buffer
   /// @param live     gives the present configuration; called from the thread
-  SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh, const ServerConfig& config,
+  SelfProximity(ros::NodeHandle private_nh, const ServerConfig& config,
                 const TransformBuffer& buffer, JointStateListener* joints,
                 std::function<LiveConfig()> live);
   ~SelfProximity();
@@ -59,7 +58,6 @@ class SelfProximity {
   Wrench penetration(std::size_t link, const LinkProximity& answer) const;
 
   const ServerConfig config_;
-  ros::NodeHandle nh_;
   const TransformBuffer& buffer_;
   JointStateListener* const joints_;
   const std::function<LiveConfig()> live_;

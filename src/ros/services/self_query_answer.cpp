@@ -42,10 +42,12 @@ void SelfQueryAnswer::set_model(const std::shared_ptr<const ModelState>& model) 
 
 void SelfQueryAnswer::choose(const std::vector<bool>& chosen) {
   if (!query_) {
-    query_ = std::make_unique<SelfQuery>(
-        model_->robot, choose_pairs(nh_, config_, *model_, {}).watched(), config_.query);
+    query_ = std::make_unique<SelfQuery>(model_->robot, choose_pairs(config_, model_).watched(),
+                                         config_.query);
   }
-  std::vector<bool> is_chosen(model_->robot->links.size(), false);
+  // A link that is not monitored cannot be asked for: its pairs are among all.
+  const bool all = std::find(chosen.begin(), chosen.end(), false) == chosen.end();
+  std::vector<bool> is_chosen(model_->robot->links.size(), all);
   for (std::size_t i = 0; i < chosen.size(); ++i) is_chosen[model_->monitored[i]] = chosen[i];
   pairs_.clear();
   for (std::size_t i = 0; i < query_->pairs().size(); ++i) {

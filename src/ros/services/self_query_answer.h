@@ -19,8 +19,7 @@ namespace ist {
 /// first asked. One thread.
 class SelfQueryAnswer {
  public:
-  SelfQueryAnswer(const ros::NodeHandle& nh, ServerConfig config)
-      : config_(std::move(config)), nh_(nh) {}
+  explicit SelfQueryAnswer(ServerConfig config) : config_(std::move(config)) {}
 
   /// Takes a model that is ready and has kinematics.
   void set_model(const std::shared_ptr<const ModelState>& model);
@@ -47,7 +46,6 @@ class SelfQueryAnswer {
 
  private:
   const ServerConfig config_;
-  ros::NodeHandle nh_;
   std::shared_ptr<const ModelState> model_;
   std::unique_ptr<ForwardKinematics> forward_;
   std::unique_ptr<SelfQuery> query_;           ///< of the watched pairs; null until it is needed

@@ -127,6 +127,7 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
   add_value("ready", ready ? "100 %" : format_text("%.0f %%", 100 * state.fraction), &status);
   add_value("links monitored", state.links.size(), &status);
   if (ready) add_value("links", link_counts(state), &status);
+  if (!state.choice.remarks.empty()) add_value("links left out", state.choice.remarks, &status);
   for (const AttachedObject& object : state.objects) {
     add_value("attached object", "'" + object.name + "' on '" + object.link + "'", &status);
   }
