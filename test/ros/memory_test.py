@@ -75,6 +75,8 @@ class MemoryTest(unittest.TestCase):
         seen = self.node.wait_for(self.is_from("cloud"), "the far patch in view")
         self.assertAlmostEqual(self.ball(seen).distance, distance_to(FAR), delta=2e-3)
         self.assertEqual([s.name for s in seen.sources], ["cloud", "cloud/memory"])
+        ball = self.ball(seen)  # ~unknown_space is free
+        self.assertTrue(np.isnan([ball.seen_share, ball.seen_age, ball.unseen_distance]).all())
 
         hidden_since = rospy.Time.now().to_sec()
         self.world.points = NEAR
@@ -320,6 +322,8 @@ class MemoryTest(unittest.TestCase):
         ]
         before, after = self.move_in_cone("report")
         self.assertLess(after.unseen_distance, before.unseen_distance)
+        for ball in (before, after):  # reported, and no obstacle
+            self.assertAlmostEqual(ball.lower_bound, ball.distance, delta=0.002)
         last = len(dots)
         self.node.wait_until(lambda: len(dots) > last + 1, "the unknown space drawn")
         for subscriber in subscribers:
@@ -334,15 +338,6 @@ class MemoryTest(unittest.TestCase):
         self.assertEqual([m.id for m in ends], [0])
         start, end = pt.vector(ends[0].points[1]), pt.vector(ends[0].points[0])
         self.assertAlmostEqual(np.linalg.norm(start - end), after.unseen_distance, delta=0.02)
-
-    def test_unknown_space_is_reported(self):
-        for ball in self.move_in_cone("report"):
-            self.assertAlmostEqual(ball.lower_bound, ball.distance, delta=0.002)
-
-    def test_unknown_space_is_free(self):
-        self.start(memory={"enabled": True})
-        ball = self.ball(self.node.wait_for(self.is_from("cloud"), "answers"))
-        self.assertTrue(np.isnan([ball.seen_share, ball.seen_age, ball.unseen_distance]).all())
 
 
 if __name__ == "__main__":
