@@ -14,6 +14,7 @@
 #include "internal/cloud/memory_scan.h"
 #include "ist_proximity/cloud/depth_image.h"
 #include "ist_proximity/cloud/seen_space.h"
+#include "support/errors.h"
 #include "support/scene.h"
 #include "support/temp_dir.h"
 
@@ -303,8 +304,7 @@ TEST(MemoryFile, FaultsAreNamedAndNothingIsLost) {
   MemoryConfig coarse;
   coarse.resolution = 0.05;
   MemoryMap other(coarse);
-  EXPECT_NE(other.read_file(path, 0.0).find("resolution of 0.02 m, the memory's is 0.05"),
-            std::string::npos);
+  test::expect_says(other.read_file(path, 0.0), "resolution of 0.02 m, the memory's is 0.05");
   // Cut off.
   std::filesystem::resize_file(path, std::filesystem::file_size(path) - 3);
   EXPECT_NE(map.read_file(path, 0.0).find("ends in the middle"), std::string::npos);

@@ -10,6 +10,7 @@
 
 #include "ist_proximity/geometry/error.h"
 #include "support/data_dir.h"
+#include "support/errors.h"
 #include "support/mesh_files.h"
 #include "support/meshes.h"
 #include "support/temp_dir.h"
@@ -55,9 +56,7 @@ std::string error_of(const std::string& path, const Eigen::Vector3d& scale = {1,
   return "(no error)";
 }
 
-void expect_says(const std::string& text, const std::string& part) {
-  EXPECT_NE(text.find(part), std::string::npos) << text;
-}
+using test::expect_says;
 
 class MeshIo : public testing::Test {
  protected:

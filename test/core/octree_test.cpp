@@ -14,6 +14,7 @@
 #include <tuple>
 #include <vector>
 
+#include "support/errors.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/temp_dir.h"
@@ -21,6 +22,7 @@
 namespace ist {
 namespace {
 
+using test::expect_says;
 using Leaf = std::tuple<double, double, double, double>;
 
 // Scattered leaves, a solid block (whose leaves merge into large ones), free space.
@@ -129,17 +131,14 @@ TEST(ReadOctree, RefusesOtherMessagesWithAReason) {
   const octomap::OcTree tree = random_tree(&rng, 0.05, 100);
   const std::string full = bytes_of(tree, false), binary = bytes_of(tree, true);
   Octree octree;
-  const auto expect_fault = [](const std::string& fault, const std::string& words) {
-    EXPECT_NE(fault.find(words), std::string::npos) << fault;
-  };
-  expect_fault(read(full, false, &octree, "ColorOcTree"), "'ColorOcTree', it must be 'OcTree'");
-  expect_fault(read(full, false, &octree, "OcTree", 0.0), "resolution is 0");
-  expect_fault(read(full, false, &octree, "OcTree", std::nan("")), "resolution is nan");
-  expect_fault(read(full, false, &octree, "OcTree", -0.1), "resolution is -0.1");
-  expect_fault(read(full + "x", false, &octree), "ends 1 bytes before");
-  expect_fault(read(binary + "xyz", true, &octree), "ends 3 bytes before");
-  expect_fault(read(std::string(100, '\xff'), true, &octree), "deeper than 16 levels");
-  expect_fault(read(std::string(100, '\xff'), false, &octree), "not finite");
+  expect_says(read(full, false, &octree, "ColorOcTree"), "'ColorOcTree', it must be 'OcTree'");
+  expect_says(read(full, false, &octree, "OcTree", 0.0), "resolution is 0");
+  expect_says(read(full, false, &octree, "OcTree", std::nan("")), "resolution is nan");
+  expect_says(read(full, false, &octree, "OcTree", -0.1), "resolution is -0.1");
+  expect_says(read(full + "x", false, &octree), "ends 1 bytes before");
+  expect_says(read(binary + "xyz", true, &octree), "ends 3 bytes before");
+  expect_says(read(std::string(100, '\xff'), true, &octree), "deeper than 16 levels");
+  expect_says(read(std::string(100, '\xff'), false, &octree), "not finite");
   EXPECT_EQ(read("", true, &octree), "");
   EXPECT_TRUE(octree.occupied.empty());
 }
@@ -205,10 +204,6 @@ TEST(ReadOctree, RandomBytes) {
   EXPECT_GT(readable, 0);
 }
 
-void expect_words(const std::string& fault, const std::string& words) {
-  EXPECT_NE(fault.find(words), std::string::npos) << "'" << words << "' not in: " << fault;
-}
-
 // Two bytes of a binary tree can be eight leaves: a message of 2.3 MB made 8 million of them, which
 // took 1.2 GB. The reader stops at the limit.
 TEST(ReadOctree, StopsAtTheLargestNumberOfLeaves) {
@@ -235,12 +230,12 @@ TEST(ReadOctree, StopsAtTheLargestNumberOfLeaves) {
   limits.max_leaves = leaves;
   EXPECT_EQ(read_octree(data, &octree, limits), "");
   limits.max_leaves = leaves - 1;
-  expect_words(read_octree(data, &octree, limits), "262143 (max_leaves)");
+  expect_says(read_octree(data, &octree, limits), "262143 (max_leaves)");
   EXPECT_LE(octree.occupied.size(), limits.max_leaves);
   limits = {};
   limits.max_bytes = bytes.size() - 1;
-  expect_words(read_octree(data, &octree, limits),
-               std::to_string(bytes.size()) + " bytes, allowed are at most");
+  expect_says(read_octree(data, &octree, limits),
+              std::to_string(bytes.size()) + " bytes, allowed are at most");
 }
 
 // With a resolution of 0.4 m the tree's space reaches 13 km from its middle, with 1000 m 33,000 km.
@@ -251,11 +246,11 @@ TEST(ReadOctree, RefusesLeavesFarOut) {
   EXPECT_EQ(octree.occupied.size(), 1U);
   for (const double resolution : {0.4, 1000.0}) {
     const std::string fault = read(root_corner, true, &octree, "OcTree", resolution);
-    expect_words(fault, "farther out than 10000 m (max_position)");
-    expect_words(fault, resolution < 1 ? "-13107.2" : "-3.2768e+07");
+    expect_says(fault, "farther out than 10000 m (max_position)");
+    expect_says(fault, resolution < 1 ? "-13107.2" : "-3.2768e+07");
   }
   for (const double resolution : {1e-300, 1e300}) {
-    expect_words(read(root_corner, true, &octree, "OcTree", resolution), "resolution is 1e");
+    expect_says(read(root_corner, true, &octree, "OcTree", resolution), "resolution is 1e");
   }
   // A small leaf in the middle of the same space is near enough.
   std::string chain;
@@ -273,8 +268,8 @@ TEST(ReadOctree, ReadsOnlyRegularFilesOfLimitedSize) {
   Octree octree;
   for (const std::string& path : {fifo, std::string("/dev/zero"), folder.path().string()}) {
     const std::string fault = read_octree_file(path, &octree);
-    expect_words(fault, "'" + path + "'");
-    expect_words(fault, "no regular file");
+    expect_says(fault, "'" + path + "'");
+    expect_says(fault, "no regular file");
   }
   test::Rng rng(56);
   const std::string path = folder.file("map.ot");
@@ -284,11 +279,11 @@ TEST(ReadOctree, ReadsOnlyRegularFilesOfLimitedSize) {
   limits.max_bytes = size;
   EXPECT_EQ(read_octree_file(path, &octree, limits), "");
   limits.max_bytes = size - 1;
-  expect_words(read_octree_file(path, &octree, limits),
-               std::to_string(size) + " bytes, allowed are at most " + std::to_string(size - 1));
+  expect_says(read_octree_file(path, &octree, limits),
+              std::to_string(size) + " bytes, allowed are at most " + std::to_string(size - 1));
   // A sparse file of a terabyte is refused before it is read.
   std::filesystem::resize_file(path, std::uintmax_t{1} << 40U);
-  expect_words(read_octree_file(path, &octree), "1099511627776 bytes");
+  expect_says(read_octree_file(path, &octree), "1099511627776 bytes");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ist_proximity/geometry/error.h"
+#include "support/errors.h"
 #include "support/temp_dir.h"
 
 namespace ist {
@@ -53,9 +54,7 @@ std::string error_of(const std::string& uri, const PackageFinder& finder = one_p
   }
 }
 
-void expect_says(const std::string& text, const std::string& part) {
-  EXPECT_NE(text.find(part), std::string::npos) << text;
-}
+using test::expect_says;
 
 TEST(ResolveUri, resolvesPackagesFilesAndPaths) {
   EXPECT_EQ(resolve_uri("package://robot/meshes/a.stl", one_package), "/share/robot/meshes/a.stl");
