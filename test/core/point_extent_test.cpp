@@ -489,15 +489,7 @@ TEST(ExtentConfig, WhatMakesNoSenseIsNamed) {
 // The angle between pixels comes from the message, or the cloud is refused.
 TEST(ExtentConfig, FootprintOfACloud) {
   std::vector<Eigen::Vector3d> points(12, Eigen::Vector3d(0.0, 0.0, 1.0));
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(points.data());
-  cloud.width = 4;
-  cloud.height = 3;
-  cloud.point_step = sizeof(Eigen::Vector3d);
-  cloud.row_step = 4 * sizeof(Eigen::Vector3d);
-  cloud.y = sizeof(double);
-  cloud.z = 2 * sizeof(double);
-  cloud.is_double = true;
+  RawCloud cloud = packed_cloud(points.data()->data(), 4, 3);
   IngestConfig config;
   config.self_filter = false;
   config.extent.footprint = ExtentConfig::Footprint::kCamera;
