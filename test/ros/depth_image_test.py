@@ -248,18 +248,6 @@ class DepthImageTest(unittest.TestCase):
         self.assertTrue(pt.all_unknown(message))
         clouds.unregister()
 
-    def test_noise_filter(self):
-        """A lone pixel, 0.2 m in front of the wall, is dropped."""
-        values = depths()
-        values[20:23, 30:33] = 0.0
-        values[21, 31] = 0.4
-        seen = pt.apply(X_BASE_CAMERA, points(np.where(values == 0.4, 0.0, values)))
-        self.start(noise_filter={"radius": 0.05})
-        with self.stream(lambda: image(values)):
-            answer = self.node.wait_for_status(ProximityArray.OK)
-        truth = pt.DISTANCE["ball_link"](seen).min()
-        self.assertAlmostEqual(pt.link(answer, "ball_link").distance, truth, 5)
-
     def test_wrong_topic(self):
         """A topic of another type is named; else the topics that a source could have."""
         other = rospy.Publisher(self.namespace + "/points", PointCloud2, queue_size=1)
