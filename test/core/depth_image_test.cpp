@@ -16,6 +16,7 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "support/errors.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/scene.h"
@@ -104,14 +105,7 @@ class PeerCloud {
       if (std::isinf(z)) p.setConstant(kInf);
       points.push_back(p);
     }
-    raw.data = reinterpret_cast<const std::uint8_t*>(points.data());
-    raw.width = width;
-    raw.height = points.size() / width;
-    raw.point_step = sizeof(Eigen::Vector3d);
-    raw.row_step = width * raw.point_step;
-    raw.y = sizeof(double);
-    raw.z = 2 * sizeof(double);
-    raw.is_double = true;
+    raw = packed_cloud(points.data()->data(), width, points.size() / width);
   }
 
   std::vector<Eigen::Vector3d> points;
@@ -297,8 +291,7 @@ TEST(DepthImage, Unit) {
   Message message(std::vector<double>(32, 1.0), 8, camera, {"16UC1"});
   for (const double unit : {-1.0, kNan, kInf}) {
     message.image.unit = unit;
-    EXPECT_NE(check_depth_image(message.image, message.rays, &message.raw).find("unit is"),
-              std::string::npos);
+    test::expect_says(check_depth_image(message.image, message.rays, &message.raw), "unit is");
   }
 }
 
@@ -403,8 +396,7 @@ TEST(DepthImage, FaultyImages) {
     EXPECT_EQ(cloud.data, nullptr) << one.says;
   }
   RawCloud cloud;
-  EXPECT_NE(check_depth_image(message.image, message.rays, &cloud, 127).find("max_points"),
-            std::string::npos);
+  test::expect_says(check_depth_image(message.image, message.rays, &cloud, 127), "max_points");
   EXPECT_NE(check_depth_image(message.image, nullptr, &cloud), "");
 }
 

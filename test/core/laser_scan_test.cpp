@@ -194,14 +194,7 @@ TEST(LaserScan, SelfFilterDividesATileByTime) {
   const auto model = test::make_model({Sphere{0.1}}, 0.005);
   std::vector<Eigen::Vector3f> points;
   for (int i = 0; i < 16; ++i) points.emplace_back(1.0F + 1e-4F * i, 0.0F, 0.0F);
-  RawCloud raw;
-  raw.data = reinterpret_cast<const std::uint8_t*>(points.data());
-  raw.width = points.size();
-  raw.height = 1;
-  raw.point_step = sizeof(Eigen::Vector3f);
-  raw.row_step = raw.point_step * raw.width;
-  raw.y = sizeof(float);
-  raw.z = 2 * sizeof(float);
+  const RawCloud raw = packed_cloud(points.data()->data(), points.size(), 1);
   IngestConfig config = test::whole_cloud();
   config.self_filter = true;
   PosedSolid solid{&model->links[0].tree, &model->links[0].solid};

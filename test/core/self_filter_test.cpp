@@ -96,15 +96,7 @@ std::vector<Eigen::Vector3f> cloud_about_the_robot(std::size_t n) {
 }
 
 RawCloud raw_of(const std::vector<Eigen::Vector3f>& points) {
-  RawCloud raw;
-  raw.data = reinterpret_cast<const std::uint8_t*>(points.data());
-  raw.width = points.size();
-  raw.height = 1;
-  raw.point_step = sizeof(Eigen::Vector3f);
-  raw.row_step = raw.width * raw.point_step;
-  raw.y = 4;
-  raw.z = 8;
-  return raw;
+  return packed_cloud(points.data()->data(), points.size(), 1);
 }
 
 // Runs a cloud that is given in the frame of a sensor at `base`.
@@ -302,14 +294,7 @@ TEST(SelfFilter, anImageIsDecidedByItsBoxes) {
     image->insert(image->end(), {u * depth, v * depth, depth, 0.0F});
     holes += is_hole ? 1 : 0;
   }
-  RawCloud raw;
-  raw.data = reinterpret_cast<const std::uint8_t*>(image->data());
-  raw.width = kWidth;
-  raw.height = kHeight;
-  raw.point_step = 4 * sizeof(float);
-  raw.row_step = kWidth * raw.point_step;
-  raw.y = sizeof(float);
-  raw.z = 2 * sizeof(float);
+  RawCloud raw = packed_cloud(image->data(), kWidth, kHeight, 4);
   raw.owner = image;
   for (const double padding : {0.0, 0.02, 0.1}) {
     SCOPED_TRACE(padding);

@@ -41,17 +41,6 @@ Eigen::Vector3d random_direction(std::mt19937_64* random) {
   return Eigen::Vector3d(normal(*random), normal(*random), normal(*random)).normalized();
 }
 
-RawCloud cloud_of(const std::array<float, 3 * kPixels>& xyz) {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-  cloud.width = cloud.height = kTileSide;
-  cloud.point_step = 3 * sizeof(float);
-  cloud.row_step = kTileSide * cloud.point_step;
-  cloud.y = sizeof(float);
-  cloud.z = 2 * sizeof(float);
-  return cloud;
-}
-
 // Where a ray first meets the link whose surface is nearest to the point; the first of equals.
 TileView::Sight nearest_surface(const std::vector<const SelfFilter::Link*>& links,
                                 const std::vector<Eigen::Isometry3d>& X_LS,
@@ -124,7 +113,7 @@ TEST(TileView, SightsAreThoseOfAllLinksInAnyOrder) {
     const std::vector<const SelfFilter::Link*> sorted = links;
     std::shuffle(links.begin(), links.end(), random);
 
-    const RawCloud cloud = cloud_of(xyz);
+    const RawCloud cloud = packed_cloud(xyz.data(), kTileSide, kTileSide);
     const long before = test::allocations;
     view.read(cloud, 0, 0, kept);
     view.begin(behind);

@@ -76,17 +76,7 @@ struct Image {
   std::vector<float> xyz;
   std::vector<int> seen;  // by pixel: number of the body; -1: none
 
-  RawCloud raw() const {
-    RawCloud cloud;
-    cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-    cloud.width = kWidth;
-    cloud.height = kHeight;
-    cloud.point_step = 3 * sizeof(float);
-    cloud.row_step = kWidth * cloud.point_step;
-    cloud.y = sizeof(float);
-    cloud.z = 2 * sizeof(float);
-    return cloud;
-  }
+  RawCloud raw() const { return packed_cloud(xyz.data(), kWidth, kHeight); }
 };
 
 // A picture from X_FS of bodies, with noise along the rays; a wall is 2.5 m away.
