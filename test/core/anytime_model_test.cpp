@@ -16,9 +16,7 @@
 #include <vector>
 
 #include "internal/geometry/distance_field.h"
-#include "internal/packing/packer.h"
 #include "internal/robot/model_memory.h"
-#include "ist_proximity/geometry/error.h"
 #include "support/data_dir.h"
 #include "support/demo_arm.h"
 #include "support/meshes.h"
@@ -142,6 +140,7 @@ TEST(AnytimeModel, growsLinkByLinkToTheFinalPacking) {
   for (std::size_t k = 1; k < stages.size(); ++k) {
     const RobotModel &before = *stages[k - 1]->robot(), &after = *stages[k]->robot();
     EXPECT_TRUE(same_geometry(before, after));
+    EXPECT_EQ(memory_of(after).solids, memory_of(before).solids) << "they are there once";
     std::size_t changed = 0;
     for (std::size_t i = 0; i < after.links.size(); ++i) {
       const LinkModel &old = before.links[i], &now = after.links[i];
@@ -165,18 +164,6 @@ TEST(AnytimeModel, growsLinkByLinkToTheFinalPacking) {
       ASSERT_EQ(grown.packing.spheres[s].cover_radius, packed.packing.spheres[s].cover_radius);
     }
   }
-}
-
-// Finer spheres take memory, and the exact geometry is there once however often a link is refined.
-TEST(AnytimeModel, memoryGrowsWithTheSpheresAlone) {
-  const auto stages = growth(AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst));
-  const ModelMemory first = memory_of(*stages.front()->robot());
-  const ModelMemory last = memory_of(*stages.back()->robot());
-  EXPECT_GT(first.packings, 0U);
-  EXPECT_GT(first.trees, 0U);
-  EXPECT_GT(first.solids, 0U);
-  EXPECT_EQ(last.solids, first.solids);
-  if (!test::kSanitized) EXPECT_GT(last.packings + last.trees, first.packings + first.trees);
 }
 
 // A field changes nothing but the time of queries, and stays while packings become finer.
@@ -237,13 +224,6 @@ TEST(AnytimeModel, advancesByFieldsAndThenBySpheres) {
   LinkModel without_geometry;
   without_geometry.error = "no geometry";
   EXPECT_EQ(AnytimeModel::next_step(without_geometry), LinkStep::kNone);
-}
-
-TEST(AnytimeModel, measuringAFieldCanBeCancelled) {
-  const auto first = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
-  RobotModelCallbacks callbacks;
-  callbacks.cancelled = [] { return true; };
-  EXPECT_EQ(first->with_field(0, callbacks), nullptr);
 }
 
 TEST(AnytimeModel, fieldsOfAllLinksAreMeasuredWhereTheyAreAskedFor) {
@@ -341,23 +321,6 @@ TEST(AnytimeModel, theFirstStageIsASmallPartOfThePackingOfThePanda) {
   expect_first_stage_is_small(text.str(), GeometrySource::kCollision, package);
 }
 
-// Solids are made before packings, and packings read their hierarchies.
-TEST(AnytimeModel, packsAsAShapeIsPackedByItself) {
-  for (const TriangleMesh& mesh :
-       {test::torus(0.1, 0.03, 24, 12), test::open_box({0.2, 0.15, 0.1})}) {
-    const std::vector<LinkGeometry> links = {test::one(mesh)};
-    const RobotModelConfig config = config_to(kMaxError);
-    const auto model = AnytimeModel::build(robot_of(links), config, Stage::kFinal);
-    const Packing alone = pack_mesh(mesh, config.packing);
-    const Packing& packing = model->robot()->links[0].packing;
-    ASSERT_EQ(packing.spheres.size(), alone.spheres.size());
-    for (std::size_t i = 0; i < alone.spheres.size(); ++i) {
-      EXPECT_EQ(packing.spheres[i].center, alone.spheres[i].center);
-      EXPECT_EQ(packing.spheres[i].cover_radius, alone.spheres[i].cover_radius);
-    }
-  }
-}
-
 // A link without its solid would be clear of everything.
 TEST(AnytimeModel, refusesAnElementThatIsNowhere) {
   for (const double x : {1e6, std::numeric_limits<double>::quiet_NaN()}) {
@@ -379,13 +342,8 @@ TEST(AnytimeModel, canBeCancelledAtEveryStep) {
   const std::ptrdiff_t link = next_link(*first->robot(), -1);
   if (link < 0) GTEST_SKIP() << "packed coarsely";
   EXPECT_EQ(first->refined(static_cast<std::size_t>(link), callbacks), nullptr);
+  EXPECT_EQ(first->with_field(static_cast<std::size_t>(link), callbacks), nullptr);
   EXPECT_EQ(first->with_link(demo(), first->robot()->links[0].name, {}, callbacks), nullptr);
-}
-
-TEST(AnytimeModel, refusesAnInvalidPackingConfiguration) {
-  RobotModelConfig config;
-  config.packing.max_error = 0.0;
-  EXPECT_THROW(AnytimeModel::build(demo(), config, Stage::kFirst), ModelError);
 }
 
 // An object that is attached while packing goes on: links keep the packings that they have, those
