@@ -69,9 +69,8 @@ struct RobotProximity {
 
 /// Counts of a query's work, for tuning and tests.
 struct QueryStatistics {
-  /// Pairs of tree node and BVH node that were expanded; BVH nodes of a search by the field.
-  std::uint64_t node_pairs = 0;
-  std::uint64_t leaf_pairs = 0;  ///< pairs of sphere leaf and tile of obstacles; tiles, as above
+  std::uint64_t node_pairs = 0;         ///< nodes of hierarchies of obstacles that were expanded
+  std::uint64_t leaf_pairs = 0;         ///< tiles of obstacles that were looked at
   std::uint64_t exact_evaluations = 0;  ///< points measured against the link's exact geometry
   std::uint64_t outside_region = 0;     ///< links whose range ends outside a cloud's region
   std::uint64_t unfinished = 0;         ///< links that a deadline left wider than the tolerance
@@ -82,19 +81,15 @@ struct QueryStatistics {
 
 /// Distances from the links of a robot to point clouds.
 ///
-/// Branch and bound: a dual-tree traversal of each link's Inner Sphere Tree and the BVH of every
-/// cloud prunes pairs by lower bounds; obstacles that remain are measured against the exact
-/// geometry until `tolerance` is met, so `distance` is exactly that of one obstacle point. Near the
-/// link and inside, and where very many points are about equally near, a traversal of the BVH alone
-/// takes over: a grid of signed distances about the link bounds boxes and points for the whole
-/// link.
+/// Branch and bound over the hierarchies of clouds and maps, best first: boxes are bounded by the
+/// link's distance field (LinkModel::field), or where it has none by the cover spheres of its Inner
+/// Sphere Tree; obstacles that remain are measured against the exact geometry until `tolerance` is
+/// met, so `distance` is exactly that of one obstacle point. Bounds are signed, so contact and
+/// depth are the same search.
 ///
-/// Links that have a distance field (LinkModel::field) are searched by it among points. Where it
-/// tells too little, one of these traversals follows.
-///
-/// A query that has a deadline first proves a bound of every link and measures one obstacle for it;
-/// then it asks every link to within half of its distance, and then to within the tolerance, the
-/// link that may be nearest first.
+/// A query that has a deadline first measures one obstacle for every link and proves which links
+/// are free; then it asks every link to within half of its distance, and then to within the
+/// tolerance, the link that may be nearest first.
 ///
 /// Queries allocate nothing, lock nothing and never throw; one object per thread. The last answer
 /// gives the next query its first upper bound (warm start). While the snapshots stay the same,
@@ -104,9 +99,8 @@ struct QueryStatistics {
 /// differ within the tolerance, each with a proven bound. At tolerance 0 both distances are the
 /// true one.
 ///
-/// Working memory is about 900 kB a link: 330 kB of signed distances about the link, 180 kB of
-/// bounds of BVH nodes and tiles (150 kB more for a mesh with holes), 160 kB of BVTT fronts, 80 and
-/// 120 kB of distances of points and of boxes, and 40 bytes for each node of its tree.
+/// Working memory is about 90 kB a link for the parts of clouds and maps that the last searches
+/// have pruned, and 33 kB more for a mesh with holes.
 class ProximityQuery {
  public:
   /// @param model  shared with the caller; not null
@@ -139,9 +133,7 @@ class ProximityQuery {
                 LinkProximity* result);
 
   /// Takes a model that differs from the present one in packings alone (see same_geometry()).
-  /// Whatever was proven or measured stays: bounds, exact distances, the answer to start from. A
-  /// link with another packing_id only forgets its BVTT fronts, which name nodes of its old tree.
-  /// Allocates the scratch memory of such links' trees, 40 bytes a node.
+  /// Whatever was proven or measured stays: bounds, fronts, the answer to start from.
   void set_model(std::shared_ptr<const RobotModel> model);
 
   /// Takes effect at the next run().
