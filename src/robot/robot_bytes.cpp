@@ -303,7 +303,7 @@ LinkModel read_link_model(const RobotDescription& description, Reader* in) {
   for (const LinkDescription& one : description.links) {
     if (one.name != link.name) continue;
     if (link.packing.spheres.empty()) Reader::fail("link '" + link.name + "' has no spheres");
-    link.tree = InnerSphereTree(link.packing, {});
+    link.tree = InnerSphereTree(link.packing);
     link.solid = Solid(one.geometry);
     return link;
   }
