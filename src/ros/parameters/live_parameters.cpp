@@ -102,6 +102,17 @@ bool write(const std::string& name, const XmlRpcValue& value) {
   return ros::master::execute("setParam", request, response, payload, false);
 }
 
+std::string path_of(const std::string& group, const std::string& name) {
+  return group + "/" + name;
+}
+
+/// @param before  the value in use; null: it was not set
+std::string change_text(const std::string& name, const std::string& value,
+                        const std::string* before) {
+  if (before == nullptr) return "~" + name + " has been set to " + value;
+  return "~" + name + " is " + value + ", in use is " + *before;
+}
+
 std::string text_of(const XmlRpcValue& value) {
   if (value.getType() == XmlRpcValue::TypeDouble) {
     return number_text(static_cast<const double&>(value));
@@ -217,10 +228,10 @@ void LiveParameters::note_startup_changes(const XmlRpcValue& tree) {
   for (const auto& [name, value] : now) {
     const auto before = at_start_->find(name);
     const std::string text = text_of(value);
-    if (before == at_start_->end()) {
-      changes.push_back("~" + name + " has been set to " + text);
-    } else if (const std::string in_use = text_of(before->second); in_use != text) {
-      changes.push_back("~" + name + " is " + text + ", in use is " + in_use);
+    const bool is_new = before == at_start_->end();
+    const std::string in_use = is_new ? "" : text_of(before->second);
+    if (is_new || in_use != text) {
+      changes.push_back(change_text(name, text, is_new ? nullptr : &in_use));
     }
   }
   std::string sentence = join(changes, "; ");
@@ -305,7 +316,7 @@ bool LiveParameters::apply(const std::string& group,
   XmlRpcValue tree;
   for (const auto& [name, value] : change) {
     XmlRpcValue* place = &tree;
-    std::istringstream path(group + "/" + name);
+    std::istringstream path(path_of(group, name));
     for (std::string part; std::getline(path, part, '/');) place = &(*place)[part];
     *place = value;
   }
@@ -316,7 +327,7 @@ bool LiveParameters::apply(const std::string& group,
     return true;  // the response holds the values in use
   }
   for (const auto& [name, value] : change) {
-    const std::string full = group + "/" + name;
+    const std::string full = path_of(group, name);
     if (write(private_nh_.resolveName(full), value)) continue;
     set_problem("the parameter server does not take ~" + full);
     return false;

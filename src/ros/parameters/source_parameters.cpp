@@ -243,11 +243,10 @@ void read_map(ParameterReader* reader, const std::string& at, SourceConfig* sour
 double usual_range(SourceType type) { return type == SourceType::kDepthImage ? 10.0 : 100.0; }
 
 void read_source(ParameterReader* reader, const std::string& at, SourceConfig* source) {
-  std::vector<std::string> types;
-  for (int i = 0; i < static_cast<int>(SourceType::kWorld); ++i) {
-    types.emplace_back(message_type(static_cast<SourceType>(i)));
+  std::vector<std::string> types(static_cast<std::size_t>(SourceType::kWorld) + 1, "world");
+  for (std::size_t i = 0; i + 1 < types.size(); ++i) {
+    types[i] = message_type(static_cast<SourceType>(i));
   }
-  types.emplace_back("world");
   reader->read({at + "type", choice(&source->type, types)});
   const bool is_image = source->type == SourceType::kDepthImage;
   const bool is_cloud = source->type == SourceType::kCloud || is_image;

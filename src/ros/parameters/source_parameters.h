@@ -13,8 +13,8 @@ namespace ist {
 std::vector<SourceConfig> read_sources(ParameterReader* reader);
 
 /// Reads what a source of type `world` has besides `topic` and `required`.
-/// @param prefix  of their names, with the slash at its end
-void read_world(ParameterReader* reader, const std::string& prefix, SourceConfig* source);
+/// @param at  the prefix of their names, with the slash at its end
+void read_world(ParameterReader* reader, const std::string& at, SourceConfig* source);
 
 /// Reads a path that has to be absolute.
 void read_path(ParameterReader* reader, const std::string& name, const char* example,

@@ -89,6 +89,18 @@ void read_shape(ParameterReader* reader, const std::string& at, WorldObjectConfi
   config->object.geometry = {element};
 }
 
+void read_object(ParameterReader* reader, const std::string& at, const WorldConfig& world,
+                 WorldObjectConfig* config) {
+  WorldObject& object = config->object;
+  object.frame = world.frame_id;
+  object.margin = world.margin;
+  reader->read_all({{at + "frame_id", &object.frame},
+                    {at + "margin", &object.margin, kMargin},
+                    {at + "allowed_links", &object.allowed_links}});
+  read_pose(reader, at, &object.X_BO);
+  read_shape(reader, at, config);
+}
+
 void read_objects(ParameterReader* reader, const std::string& at, WorldConfig* world) {
   const std::vector<std::string> names = reader->children(at + "objects");
   if (names.size() > world->limits.max_objects) {
@@ -97,19 +109,12 @@ void read_objects(ParameterReader* reader, const std::string& at, WorldConfig* w
                           std::to_string(world->limits.max_objects) + " (max_objects)");
     return;
   }
+  const std::string folder = at + "objects/";
   for (const std::string& name : names) {
-    const std::string of = at + "objects/" + name + "/";
-    WorldObjectConfig config;
-    WorldObject& object = config.object;
-    object.name = name;
-    object.frame = world->frame_id;
-    object.margin = world->margin;
-    reader->read_all({{of + "frame_id", &object.frame},
-                      {of + "margin", &object.margin, kMargin},
-                      {of + "allowed_links", &object.allowed_links}});
-    read_pose(reader, of, &object.X_BO);
-    read_shape(reader, of, &config);
-    world->objects.push_back(config);
+    world->objects.emplace_back();
+    world->objects.back().object.name = name;
+    const std::string object = folder + name;
+    read_object(reader, object + "/", *world, &world->objects.back());
   }
 }
 
@@ -164,8 +169,9 @@ void read_world(ParameterReader* reader, const std::string& at, SourceConfig* so
                     {at + "max_triangles", &world.limits.max_triangles, {"", 1.0, 1e8}},
                     {at + "margin", &world.margin, kMargin},
                     {at + "allowed_contacts", &world.allowed_contacts}});
+  const std::string margins = at + "link_margins/";
   for (const std::string& link : reader->children(at + "link_margins")) {
-    reader->read({at + "link_margins/" + link, &world.link_margins[link], kMargin});
+    reader->read({margins + link, &world.link_margins[link], kMargin});
   }
   read_objects(reader, at, &world);
   read_robot(reader, at + "robot", &world.robot);
