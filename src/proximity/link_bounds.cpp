@@ -6,9 +6,58 @@
 #include <cmath>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/tree/sphere_tree_stack.h"
 #include "proximity/field_bounds.h"
 
 namespace ist {
+namespace {
+
+// Bounding spheres that are no larger than this share of a box count as whole.
+constexpr float kCoarse = 0.5F;
+
+using Row = Eigen::Array<float, kSphereWidth, 1>;
+
+// [m] No cover sphere is nearer to a place, but for the rounding of float.
+// @param coarse  [m] bounding spheres up to this radius are not opened
+float cover_distance(const InnerSphereTree& tree, float x, float y, float z, float coarse) {
+  struct Entry {
+    std::int32_t child;
+    float bound;
+  };
+  SphereTreeStack<Entry> stack;
+  float nearest = kFarAway;
+  const auto distances = [&](const auto& spheres, const float* radius) {
+    const auto row = [](const float* values) { return Eigen::Map<const Row>(values); };
+    return Row(((row(spheres.x) - x).square() + (row(spheres.y) - y).square() +
+                (row(spheres.z) - z).square())
+                   .sqrt() -
+               row(radius));
+  };
+  stack.push({0, -kFarAway});
+  while (!stack.empty()) {
+    const Entry entry = stack.pop();
+    if (entry.bound >= nearest) continue;
+    if (entry.child < 0) {
+      const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~entry.child)];
+      nearest = std::min(nearest, distances(leaf, leaf.cover_radius).minCoeff());
+      continue;
+    }
+    const SphereNode& node = tree.nodes()[static_cast<std::size_t>(entry.child)];
+    const Row bounds = distances(node, node.radius);
+    const std::size_t first = stack.size();
+    for (int k = 0; k < node.count; ++k) {
+      if (bounds[k] >= nearest) continue;
+      if (node.radius[k] <= coarse) {
+        nearest = bounds[k];
+      } else {
+        stack.push_least_on_top<&Entry::bound>(first, {node.child[k], bounds[k]});
+      }
+    }
+  }
+  return nearest;
+}
+
+}  // namespace
 
 void LinkBounds::place_box(const float* min, const float* max, Entry* box) const {
   float square = 0.0F;
@@ -45,7 +94,7 @@ void LinkBounds::bound_corners(const Entry& box, Corners* corners) const {
 }
 
 float LinkBounds::bound_boxes(const BoxRows& boxes, const Entry& parent, const Corners* corners,
-                              Bounds* bounds) const {
+                              float enough, Bounds* bounds) const {
   if (link_.field != nullptr) {
     return bound_boxes_by_field(link_, boxes, parent, corners, bounds);
   }
@@ -60,11 +109,12 @@ float LinkBounds::bound_boxes(const BoxRows& boxes, const Entry& parent, const C
     bounds->radius[k] = box.radius;
     bounds->distance[k] = height(box);
   }
-  bound_by_tree(boxes.count, false, bounds);
+  bound_by_tree(boxes.count, false, enough, bounds);
   return kFarAway;
 }
 
-float LinkBounds::bound_points(const PointTile& tile, const Entry& box, Bounds* bounds) const {
+float LinkBounds::bound_points(const PointTile& tile, const Entry& box, float enough,
+                               Bounds* bounds) const {
   if (link_.field != nullptr) return bound_points_by_field(link_, tile, box, bounds);
   Entry point{};
   for (int k = 0; k < tile.count; ++k) {
@@ -75,27 +125,32 @@ float LinkBounds::bound_points(const PointTile& tile, const Entry& box, Bounds* 
     bounds->z[k] = point.center[2];
     bounds->distance[k] = height(point);
   }
-  bound_by_tree(tile.count, true, bounds);
+  bound_by_tree(tile.count, true, enough, bounds);
   return kFarAway;
 }
 
 // Cover spheres hold the surface, and nothing inside is farther from them than the interior gap.
 // Heights above the supporting plane are in `distance`.
-void LinkBounds::bound_by_tree(int count, bool are_points, Bounds* bounds) const {
+void LinkBounds::bound_by_tree(int count, bool are_points, float enough, Bounds* bounds) const {
   const InnerSphereTree& tree = *link_.tree;
-  const double gap = tree.interior_gap();
+  const float gap = round_up(tree.interior_gap()) + link_.rounding;
   for (int k = 0; k < count; ++k) {
-    const Eigen::Vector3d p_LC(bounds->x[k], bounds->y[k], bounds->z[k]);
     const float radius = are_points ? 0.0F : bounds->radius[k];
-    const double cover = tree.cover_distance(p_LC);
-    const float by_center = round_down(cover) - radius;
     const float by_plane = bounds->distance[k];
-    const float at_center = round_down(cover - gap) - link_.rounding;
+    if (are_points) bounds->radius[k] = kFarAway;
+    if (link_.is_closed && by_plane > 0.0F && by_plane >= enough) {
+      bounds->outside[k] = bounds->surface[k] = by_plane;
+      continue;
+    }
+    const float cover = cover_distance(tree, bounds->x[k], bounds->y[k], bounds->z[k],
+                                       are_points ? 0.0F : kCoarse * radius);
+    const float by_center = cover - radius, at_center = cover - gap;
     float outside = at_center - radius, lowest = kMayBeInside;
     if (link_.is_closed) {
       if (at_center > 0.0F) outside = std::max(outside, by_center);
       outside = std::max(outside, by_plane);
       // A way out of the root sphere, or up to the plane, leads out of a closed link.
+      const Eigen::Vector3d p_LC(bounds->x[k], bounds->y[k], bounds->z[k]);
       const double out = (p_LC - tree.center()).norm() - tree.radius();
       lowest = std::max(by_plane, round_down(out) - radius);
       if (at_center > 0.0F) lowest = std::max(lowest, outside);
@@ -104,7 +159,6 @@ void LinkBounds::bound_by_tree(int count, bool are_points, Bounds* bounds) const
         outside > 0.0F ? std::max(std::max(outside, by_plane), by_center) : lowest;
     bounds->outside[k] = outside;
     bounds->surface[k] = by_center;
-    if (are_points) bounds->radius[k] = kFarAway;
   }
 }
 

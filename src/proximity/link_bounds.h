@@ -81,15 +81,16 @@ class LinkBounds {
   void bound_corners(const Entry& box, Corners* corners) const;
   /// @param parent   the box about them
   /// @param corners  of `parent`; null: not known
+  /// @param enough   [m] a bound that is not below this need not be better
   /// @returns [m] in some box every point is no farther
-  float bound_boxes(const BoxRows& boxes, const Entry& parent, const Corners* corners,
+  float bound_boxes(const BoxRows& boxes, const Entry& parent, const Corners* corners, float enough,
                     Bounds* bounds) const;
   /// @param box  about the tile
   /// @returns [m] some point is no farther
-  float bound_points(const PointTile& tile, const Entry& box, Bounds* bounds) const;
+  float bound_points(const PointTile& tile, const Entry& box, float enough, Bounds* bounds) const;
 
  private:
-  void bound_by_tree(int count, bool are_points, Bounds* bounds) const;
+  void bound_by_tree(int count, bool are_points, float enough, Bounds* bounds) const;
 
   const PlacedLink& link_;
 };

@@ -175,7 +175,8 @@ struct LinkSearch : SearchResult {
   /// @param bound  [m] what is proven
   bool has_time(double bound) const {
     if (stops_when_free && bound > 0.0) return false;
-    return !deadline->passed() || (!(bound > 0.0) && !deadline->passed_by(kFirstBounds));
+    if (!deadline->passed()) return true;
+    return !(bound > 0.0) && closest.exact.distance > 0.0 && !deadline->passed_by(kFirstBounds);
   }
   void prune(double bound) { pruned_bound = std::min(pruned_bound, bound); }
 

@@ -119,11 +119,13 @@ class Search {
     entry.lane = kNoObstacle;
     entry.slots = part.slots;
     bounds_.place_box(part.min, part.max, &entry);
-    float bound = link_.is_closed || part.outside > 0.0F ? part.bound : kMayBeInside;
-    if (link_.is_closed && !Measure::kHasExtent) {
+    // Near holes no plane tells inside from outside.
+    const bool is_outside = link_.is_closed || part.outside > 0.0F;
+    float bound = is_outside ? part.bound : kMayBeInside;
+    if (is_outside && !Measure::kHasExtent) {
       const float height = bounds_.height(entry);
       bound = std::max(bound, height);
-      entry.outside = std::max(entry.outside, height);
+      if (link_.is_closed) entry.outside = std::max(entry.outside, height);
     }
     Entry* place = queue_.push(bound);
     assert(place != nullptr);  // a front is smaller than the queue
@@ -206,8 +208,8 @@ class Search {
     ++outcome_.nodes;
     const BoxNode& node = bvh_.nodes()[static_cast<std::size_t>(entry.child)];
     Bounds bounds;
-    lower_limit(
-        bounds_.bound_boxes(BoxRows(node), entry, has_corners ? &corners : nullptr, &bounds));
+    lower_limit(bounds_.bound_boxes(BoxRows(node), entry, has_corners ? &corners : nullptr,
+                                    enough(), &bounds));
     measure_.take_extents(BoxRows(node), &bounds);
     const std::uint32_t slots = entry.slots & first_slots(node.count);
     const auto [below, bound, outside] = split_slots(slots, limit_, &bounds);
@@ -259,15 +261,18 @@ class Search {
   }
 
   float bound_tile(const PointTile& tile, const Entry& box, Bounds* bounds) {
-    const float farthest = bounds_.bound_points(tile, box, bounds);
+    const float farthest = bounds_.bound_points(tile, box, enough(), bounds);
     measure_.take_extents(tile, bounds);
     return farthest;
   }
   float bound_tile(const BoxTile& tile, const Entry& box, Bounds* bounds) {
-    const float farthest = bounds_.bound_boxes(BoxRows(tile), box, nullptr, bounds);
+    const float farthest = bounds_.bound_boxes(BoxRows(tile), box, nullptr, enough(), bounds);
     measure_.take_extents(BoxRows(tile), bounds);
     return farthest;
   }
+
+  // [m] A radius that is taken off may ask for any bound.
+  float enough() const { return Measure::kHasExtent ? kFarAway : limit_; }
 
   static Entry entry_of(const Bounds& bounds, int k) {
     Entry entry{};
@@ -356,6 +361,7 @@ class Search {
       // While another point is inside, one that is near the surface is not deeper, whatever its
       // side: a distance costs less than a winding number.
       if (limit_ < 0.0F && measure_.is_surface_within(point, -limit_ - link_.rounding)) {
+        remember(point, limit_, 0.0F);
         return prune(point, limit_, 0.0F);
       }
       found = measure_.ask_side(point, point.distance - link_.rounding);

@@ -251,10 +251,9 @@ TEST(Deadline, FindsAnObstacleAfterAJump) {
   }
 }
 
-// In contact with a fine mesh, with holes or without, a cell of the grid costs more than an exact
-// distance, and a tile or a node may ask for sixteen of them: queries were late by the time of
-// eight distances in the median. They are late by about one.
-TEST(Deadline, IsAskedBeforeEachCellOfTheGrid) {
+// In contact with a fine mesh, with holes or without, queries are late by about the time of one
+// exact distance: nothing is gained where a link is known not to be free.
+TEST(Deadline, IsAskedBeforeEachDistanceInContact) {
   TriangleMesh open = test::icosphere(0.1, 6);
   open.triangles.resize(open.triangles.size() - 40);
   const auto model =
