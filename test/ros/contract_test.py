@@ -124,8 +124,8 @@ class ContractTest(unittest.TestCase):
         node.wait_for_status(ProximityArray.OK)
 
     def test_links(self):
-        """The answer has the named links only; points on the other links are no obstacles either."""
-        node = self.start(pt.urdf(), links=["box_link"])
+        """The answer has the named links only; where all links filter, points on others are no obstacles."""
+        node = self.start(pt.urdf(), links=["box_link"], self_filter_links="all")
         message = node.wait_for_status(ProximityArray.OK)
         self.assertEqual([one.link for one in message.links], ["box_link"])
         self.assertEqual(message.sources[0].points_on_robot, 1)

@@ -75,9 +75,9 @@ class DiagnosticsTest(pt.NodeTest):
         self.node.wait_until(
             lambda: self.node.diagnostic("input cloud", "rate", "0").split()[0] > "0", "a rate"
         )
-        # Two links, of about 670 kB each; two points.
+        # Two links, of about 85 kB each; two points.
         number, unit = self.node.diagnostic("query", "memory of the query").split()
-        self.assertTrue(1.0 < float(number) < 2.0 and unit == "MB", number)
+        self.assertTrue(0.1 < float(number) < 0.5 and unit == "MB", number)
         number, unit = self.node.diagnostic("input cloud", "memory of the cloud's index").split()
         self.assertTrue(0.0 <= float(number) < 1.0 and unit == "MB", number)
 

@@ -225,6 +225,18 @@ def find_program(package, name):
     return roslib.packages.find_node(package, name)[0]
 
 
+_classes = {}
+_classes_lock = threading.Lock()
+
+
+def _message_class(header):
+    """The class that a connection's header defines: not every distribution has diagnostic_msgs for Python."""
+    with _classes_lock:  # genpy's generator has state of its own
+        if header["type"] not in _classes:
+            _classes.update(genpy.dynamic.generate_dynamic(header["type"], header["message_definition"]))
+        return _classes[header["type"]]
+
+
 class ProximityNode:
     """Runs proximity_node in a namespace as a process of the test, and collects its messages."""
 
@@ -285,10 +297,7 @@ class ProximityNode:
             self._condition.notify_all()
 
     def _on_diagnostics(self, raw):
-        # Not every distribution has diagnostic_msgs for Python; the connection header has its definition.
-        header = raw._connection_header
-        kinds = genpy.dynamic.generate_dynamic(header["type"], header["message_definition"])
-        message = kinds[header["type"]]().deserialize(raw._buff)
+        message = _message_class(raw._connection_header)().deserialize(raw._buff)
         with self._condition:
             for status in message.status:
                 if status.name.startswith(self.name[1:] + ":"):

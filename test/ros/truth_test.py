@@ -285,9 +285,15 @@ class TruthTest(unittest.TestCase):
         box = rng.uniform(-0.5, 0.5, (500, 3)) * pt.BOX_SIZE + pt.BOX_OFFSET
         seen = pt.apply(BALL, [[0.0, 0.0, 0.2], [0.0, 0.25, 0.0]])
         points = np.vstack([pt.apply(BALL, shell), pt.apply(BOX, box), seen])
-        # The ball alone is monitored; the box is part of the robot all the same.
+        # The ball alone is monitored; the box is part of the robot all the same where all links filter.
         clouds = []
-        node = self.start(points, links=["ball_link"], self_filter_padding=0.03, min_range=0.0)
+        node = self.start(
+            points,
+            links=["ball_link"],
+            self_filter_links="all",
+            self_filter_padding=0.03,
+            min_range=0.0,
+        )
         node.subscribe("filtered_cloud", PointCloud2, clouds.append)
         message = node.wait_for_status(ProximityArray.OK)
         self.assertEqual([one.link for one in message.links], ["ball_link"])
