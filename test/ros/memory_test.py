@@ -181,7 +181,10 @@ class MemoryTest(unittest.TestCase):
     # While a pose is unknown, clouds are not remembered. What left the view with the first of them
     # is an obstacle all the same.
     def test_hidden_while_a_pose_is_unknown(self):
-        self.start(memory={"enabled": True, "decay": 1000.0, "resolution": VOXEL})
+        self.start(
+            memory={"enabled": True, "decay": 1000.0, "resolution": VOXEL},
+            self_filter_links="all",
+        )
         self.node.wait_for(self.is_from("cloud"), "the far patch in view")
         rospy.sleep(0.5)
         del self.world.poses["box_link"]
