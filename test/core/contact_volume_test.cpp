@@ -40,18 +40,6 @@ Points wall(double half, double spacing, double z) {
   return points;
 }
 
-Points filled(const LinkGeometry& link, double half, double spacing) {
-  Points points;
-  for (double x = -half; x <= half; x += spacing) {
-    for (double y = -half; y <= half; y += spacing) {
-      for (double z = -half; z <= half; z += spacing) {
-        if (Solid(link).is_inside({x, y, z})) points.emplace_back(x, y, z);
-      }
-    }
-  }
-  return points;
-}
-
 std::vector<ContactLink> some_links() {
   std::vector<ContactLink> links;
   test::Rng rng(7);
