@@ -26,7 +26,7 @@ std::shared_ptr<const CloudSnapshot> index(const RawCloud& cloud, const Obstacle
   return snapshot;
 }
 
-// What is between a coarse hull and the link that it is drawn around is no part of the robot.
+// The space between a coarse hull and the link that it is drawn around is no part of the robot.
 void leave_out_hulls(const RobotDescription& description, const RobotModel& model,
                      std::vector<bool>* known) {
   const auto find = [&](const std::string& name) {

@@ -115,7 +115,7 @@ void BoxMeasure::measure(ObstacleId id, double max_distance,
   if (!(found.distance > 0.0)) return take_overlap(box, found, id);
   const InnerSphereTree& tree = link_.context.tree();
   const Eigen::Vector3d p_LC = obstacles_.X_LO * box.center();
-  // As a whole it may be inside.
+  // The box as a whole may be inside.
   if (!tree.cover_distance_exceeds(p_LC, tree.interior_gap())) take_point(box.center(), id);
   take_outside(found, id);
 }

@@ -136,7 +136,7 @@ class ExtentMeasure : public MeasureOf<Obstacles>::Type {
       return radius(point_O(*this->obstacles_.bvh, id));
     }
   }
-  // That of a place that is farthest from the sensor.
+  // The radius of the place that is farthest from the sensor.
   double largest_radius(const BoxRows& boxes, int k) const {
     if (Base::kHasBoxes) return box_extent_;
     double sum_sq = 0.0;

@@ -127,7 +127,7 @@ class FieldBounds {
   }
 
  private:
-  // Of places, above the supporting plane.
+  // The heights of places above the supporting plane.
   HWY_INLINE hn::Vec<BoxTag> Height(const float* x, const float* y, const float* z) const {
     const BoxTag d;
     const auto n = [&](int axis) { return hn::Set(d, in_.normal[axis]); };

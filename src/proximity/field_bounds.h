@@ -4,7 +4,7 @@
 
 namespace ist {
 
-/// What LinkBounds does where the link has a field.
+/// These functions do what LinkBounds does where the link has a field.
 float bound_boxes_by_field(const PlacedLink& link, const BoxRows& boxes,
                            const SearchQueue::Entry& parent, const Corners* corners,
                            Bounds* bounds);
