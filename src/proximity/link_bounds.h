@@ -23,8 +23,6 @@ struct PlacedLink {
   /// The link is below the plane normal . p = height. Zero: there is no plane.
   float normal[3] = {};
   float height = std::numeric_limits<float>::infinity();  ///< [m] rounded up
-
-  bool has_depths() const { return field != nullptr && field->has_depths(); }
 };
 
 /// The bound [m] of what may be inside, at any depth: it is looked at before all others.

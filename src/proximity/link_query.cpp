@@ -234,7 +234,7 @@ void LinkQuery::look_ahead() {
   if (ahead < search.other_links) search.other_links += ahead;
 }
 
-// What is kept is about the geometry, but for the terms of the last answer.
+// All that is kept is about the geometry, but for the terms of the last answer.
 void LinkQuery::set_link(const LinkModel& link) {
   LinkContext& context = link_.context;
   const bool is_same = link.packing_id != 0 && link.packing_id == context.model->packing_id;
@@ -252,7 +252,7 @@ void LinkQuery::keep_bound() {
   double bound = search.lower_bound() - search.index_error;
   // Float loses more, the farther.
   if (bound > search.range()) bound -= kFloatError * (bound - search.range());
-  // Of points beyond the regions, too.
+  // The margin is that of points beyond the regions, too.
   const double outside =
       std::min(search.outside_bound, search.region_bound - link_.context.tree().interior_gap());
   link_.kept.bound.prove(search.scene, search.X_FL, bound, outside, search.max_coordinate);

@@ -19,7 +19,7 @@ using SearchEntry = SearchQueue::Entry;
 
 inline ObstacleId id_of(const SearchEntry& entry) { return {~entry.child, entry.lane}; }
 
-/// What measures of points and of boxes have in common.
+/// The common part of measures of points and of boxes.
 template <class Index>
 class ObstacleMeasure {
  public:

@@ -15,8 +15,8 @@
 
 namespace ist {
 
-/// What a search is asked. Its lower bounds have an error of PlacedLink::rounding, which the caller
-/// takes off; `prune_bound` contains it already.
+/// The question to a search. Its lower bounds have an error of PlacedLink::rounding, which callers
+/// take off; `prune_bound` contains it already.
 struct SearchInput {
   PlacedLink link;
   SearchQueue* queue = nullptr;  ///< empty; the search leaves anything in it
@@ -132,7 +132,7 @@ class Search {
     *place = entry;
   }
 
-  // What is pushed into a full queue is visited at once.
+  // An entry that is pushed into a full queue is visited at once.
   void push(const Entry& entry, float bound) {
     Entry* place = queue_.push(bound);
     if (place != nullptr) {
