@@ -6,56 +6,13 @@
 #include <cmath>
 
 #include "internal/geometry/float_rounding.h"
-#include "internal/tree/sphere_tree_stack.h"
 #include "proximity/field_bounds.h"
 
 namespace ist {
 namespace {
 
 // Bounding spheres that are no larger than this share of a box count as whole.
-constexpr float kCoarse = 0.5F;
-
-using Row = Eigen::Array<float, kSphereWidth, 1>;
-
-// [m] No cover sphere is nearer to a place, but for the rounding of float.
-// @param coarse  [m] bounding spheres up to this radius are not opened
-float cover_distance(const InnerSphereTree& tree, float x, float y, float z, float coarse) {
-  struct Entry {
-    std::int32_t child;
-    float bound;
-  };
-  SphereTreeStack<Entry> stack;
-  float nearest = kFarAway;
-  const auto distances = [&](const auto& spheres, const float* radius) {
-    const auto row = [](const float* values) { return Eigen::Map<const Row>(values); };
-    return Row(((row(spheres.x) - x).square() + (row(spheres.y) - y).square() +
-                (row(spheres.z) - z).square())
-                   .sqrt() -
-               row(radius));
-  };
-  stack.push({0, -kFarAway});
-  while (!stack.empty()) {
-    const Entry entry = stack.pop();
-    if (entry.bound >= nearest) continue;
-    if (entry.child < 0) {
-      const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~entry.child)];
-      nearest = std::min(nearest, distances(leaf, leaf.cover_radius).minCoeff());
-      continue;
-    }
-    const SphereNode& node = tree.nodes()[static_cast<std::size_t>(entry.child)];
-    const Row bounds = distances(node, node.radius);
-    const std::size_t first = stack.size();
-    for (int k = 0; k < node.count; ++k) {
-      if (bounds[k] >= nearest) continue;
-      if (node.radius[k] <= coarse) {
-        nearest = bounds[k];
-      } else {
-        stack.push_least_on_top<&Entry::bound>(first, {node.child[k], bounds[k]});
-      }
-    }
-  }
-  return nearest;
-}
+constexpr double kCoarse = 0.5;
 
 }  // namespace
 
@@ -142,15 +99,15 @@ void LinkBounds::bound_by_tree(int count, bool are_points, float enough, Bounds*
       bounds->outside[k] = bounds->surface[k] = by_plane;
       continue;
     }
-    const float cover = cover_distance(tree, bounds->x[k], bounds->y[k], bounds->z[k],
-                                       are_points ? 0.0F : kCoarse * radius);
+    const Eigen::Vector3d p_LC(bounds->x[k], bounds->y[k], bounds->z[k]);
+    const float cover =
+        round_down(tree.cover_distance(p_LC, -1e30, are_points ? 0.0 : kCoarse * radius));
     const float by_center = cover - radius, at_center = cover - gap;
     float outside = at_center - radius, lowest = kMayBeInside;
     if (link_.is_closed) {
       if (at_center > 0.0F) outside = std::max(outside, by_center);
       outside = std::max(outside, by_plane);
       // A way out of the root sphere, or up to the plane, leads out of a closed link.
-      const Eigen::Vector3d p_LC(bounds->x[k], bounds->y[k], bounds->z[k]);
       const double out = (p_LC - tree.center()).norm() - tree.radius();
       lowest = std::max(by_plane, round_down(out) - radius);
       if (at_center > 0.0F) lowest = std::max(lowest, outside);

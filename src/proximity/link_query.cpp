@@ -56,7 +56,6 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneI
   search.rounding = search.max_coordinate = search.index_error = 0.0;
   search.is_complete = false;
   search.is_counted = false;
-  search.first_bound = -kInfinity;
   search.is_answered = scene != kUnknownScene && answered.scene == scene &&
                        other_links.distance == kInfinity && answers(answered.config, config) &&
                        answered.X_FL.matrix() == X_FL.matrix();
@@ -64,41 +63,24 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneI
   if (search.is_answered) static_cast<SearchResult&>(search) = answered.result;
 }
 
-void LinkQuery::tighten(const QueryConfig& config) {
-  LinkSearch& search = link_.search;
-  if (search.is_answered && answers(link_.kept.answered.config, config)) return;
-  search.is_answered = false;
-  search.config = config;
-  search.first_bound = search.lower_bound();
-  search.first_extent_bound = search.extents.lower_bound;
-  search.refined_bound = kInfinity;
-  search.pruned_bound = -link_.context.deepest();
-  search.is_complete = false;
-}
-
-bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
+bool LinkQuery::run(SnapshotSpan clouds, Goal goal, Deadline* deadline) {
   LinkSearch& search = link_.search;
   if (search.is_answered) {
     count_outside_region();
     return true;
   }
+  search.goal = goal;
+  search.first_bound = search.lower_bound();
+  search.first_extent_bound = search.extents.lower_bound;
+  search.refined_bound = kInfinity;
+  search.pruned_bound = -link_.context.deepest();
+  search.is_complete = false;
   Deadline* const of_question = std::exchange(search.deadline, deadline);
   const bool has_points = search_points(clouds, deadline);
-  const bool has_extents = bound_extents(clouds, deadline);
+  const bool has_extents = goal == Goal::kFree || bound_extents(clouds, deadline);
   search.deadline = of_question;  // the caller's own may not outlive this call
-  if (has_points && has_extents) keep_answer();
+  if (has_points && has_extents && goal == Goal::kTolerance) keep_answer();
   return has_points && has_extents;
-}
-
-void LinkQuery::prove_free(SnapshotSpan clouds, Deadline* deadline) {
-  LinkSearch& search = link_.search;
-  if (search.is_answered || link_.kept.bound.at(search.scene, search.X_FL) > 0.0) return;
-  Deadline* const of_question = std::exchange(search.deadline, deadline);
-  search.stops_when_free = true;
-  search_points(clouds, deadline);
-  search.stops_when_free = false;
-  search.deadline = of_question;
-  tighten(search.config);
 }
 
 // @returns false: the deadline passed before the points were known to the tolerance
@@ -213,10 +195,9 @@ bool LinkQuery::is_settled(SnapshotSpan clouds) {
   search.region_bound -= pose_error(search.drift, extent(), 0.0);
   const LinkBound& kept = link_.kept.bound;
   const double bound = kept.at(search.scene, search.X_FL);
-  if (!is_inside_regions() || !(bound >= search.prune_bound() - kDistanceRounding) ||
-      !bound_may_hold()) {
-    return false;
-  }
+  const bool is_enough = bound >= search.prune_bound() - kDistanceRounding ||
+                         (search.goal == Goal::kFree && bound > 0.0);
+  if (!is_enough || !is_inside_regions() || !bound_may_hold()) return false;
   search.pruned_bound = bound;
   search.max_coordinate =
       std::max(search.max_coordinate,

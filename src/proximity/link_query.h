@@ -10,7 +10,8 @@ namespace ist {
 struct SearchOutcome;
 
 /// The query of one link against every cloud and map of a scene. Usage: begin(), then warm_start()
-/// if wanted, once run(), then answer(). Functions neither allocate nor throw. One thread.
+/// if wanted, run() for one goal or several, then answer(). Functions neither allocate nor throw.
+/// One thread.
 ///
 /// run() is done where the bound that is kept from another pose is enough. Else it searches each
 /// index (see Search), beginning with the front that is kept from another pose.
@@ -37,17 +38,10 @@ class LinkQuery {
   /// @param has_time  false: only the last answer's obstacle, which is one exact distance
   void warm_start(SnapshotSpan clouds, bool has_time = true);
 
-  /// Proves that the link is free, where no bound that is kept does: it takes some microseconds.
-  /// The bound is kept; run() goes on from there.
-  void prove_free(SnapshotSpan clouds, Deadline* deadline);
-
-  /// Asks again for what begin() has asked, with other tolerances; what run() has found since is
-  /// the upper bound.
-  void tighten(const QueryConfig& config);
-
+  /// Goes on from what earlier runs have proven.
   /// @param deadline  for this call in place of the question's
   /// @returns false: the deadline passed first; what is known by then still holds
-  bool run(SnapshotSpan clouds, Deadline* deadline);
+  bool run(SnapshotSpan clouds, Goal goal, Deadline* deadline);
 
   /// The answer as it stands after warm_start() or run().
   void answer(SnapshotSpan clouds, LinkProximity* result);

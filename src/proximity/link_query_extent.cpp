@@ -102,7 +102,6 @@ double region_bound(SnapshotSpan clouds, const LinkQueryState& link) {
 void LinkQuery::begin_extents(SnapshotSpan clouds, double other_extents) {
   LinkSearch& search = link_.search;
   search.extents = ExtentResult();
-  search.first_extent_bound = -kInfinity;
   search.other_extents = other_extents;
   search.extent_range = 0.0;
   const auto has = [](const CloudSnapshot* cloud) { return has_extent(*cloud); };

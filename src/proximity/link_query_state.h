@@ -50,6 +50,13 @@ struct LinkContext {
   }
 };
 
+/// What is to be proven of a link.
+enum class Goal {
+  kFree,       ///< that it is free, where it is
+  kHalf,       ///< its distance, to within half of it
+  kTolerance,  ///< what was asked
+};
+
 /// The closest obstacle that a query has found, measured exactly.
 struct ClosestObstacle {
   SignedDistance exact;  ///< link frame; `distance` is the upper bound, inf: none was found
@@ -138,15 +145,15 @@ struct LinkSearch : SearchResult {
   double other_links = 0.0;   ///< [m] upper bound of other links, below which this one matters only
   bool has_extents = false;   ///< some obstacle has one
   double extent_range = 0.0;  ///< [m] largest radius of spheres in range
-  double other_extents = 0.0;    ///< [m] as other_links, of spheres
-  double width_share = 1.0;      ///< of the tolerance, that searches leave
-  bool stops_when_free = false;  ///< a search ends as soon as its bound is positive
+  double other_extents = 0.0;  ///< [m] as other_links, of spheres
+  double width_share = 1.0;    ///< of the tolerance, that searches leave
+  Goal goal = Goal::kTolerance;
   Deadline* deadline = nullptr;
   QueryStatistics* statistics = nullptr;
 
   bool is_answered = false;         ///< the question was the last one
   bool is_counted = false;          ///< in the statistics, as outside the regions
-  double first_bound = 0.0;         ///< [m] proven before tighten()
+  double first_bound = 0.0;         ///< [m] proven for another goal
   double first_extent_bound = 0.0;  ///< [m] the same for spheres
   int box_cells_left = 0;           ///< into which overlapping boxes may still be divided
   int descent_steps_left = 0;  ///< of the search for a point inside where boxes only just overlap
@@ -155,7 +162,8 @@ struct LinkSearch : SearchResult {
   double range() const { return config.max_distance + config.margin + extent_range + rounding; }
   /// [m] How far below a distance its lower bound may be.
   double width(double distance) const {
-    return std::max(config.tolerance, config.relative_tolerance * distance);
+    const double share = goal == Goal::kTolerance ? 0.0 : 0.5;
+    return std::max(config.tolerance, std::max(config.relative_tolerance, share) * distance);
   }
 
   /// [m] A lower bound that is not below this cannot change the answer by more than the tolerance.
@@ -174,7 +182,7 @@ struct LinkSearch : SearchResult {
   /// Whether a search goes on.
   /// @param bound  [m] what is proven
   bool has_time(double bound) const {
-    if (stops_when_free && bound > 0.0) return false;
+    if (goal == Goal::kFree && bound > 0.0) return false;
     if (!deadline->passed()) return true;
     return !(bound > 0.0) && closest.exact.distance > 0.0 && !deadline->passed_by(kFirstBounds);
   }

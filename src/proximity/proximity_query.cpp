@@ -36,16 +36,6 @@ struct ProximityQuery::Impl {
     links.reserve(model->links.size());
     for (const LinkModel& link : model->links) links.emplace_back(link);
     order.reserve(links.size());
-    link_statistics.resize(links.size());
-  }
-
-  void add_up_statistics() {
-    for (const QueryStatistics& link : link_statistics) {
-      statistics.node_pairs += link.node_pairs;
-      statistics.leaf_pairs += link.leaf_pairs;
-      statistics.exact_evaluations += link.exact_evaluations;
-      statistics.outside_region += link.outside_region;
-    }
   }
 
   // Whether a link can be asked at all: there are clouds, a pose, and geometry.
@@ -61,45 +51,41 @@ struct ProximityQuery::Impl {
     return fits && known[i] && can_query(i, X_FL[i], clouds);
   }
 
-  // A query that has a deadline first asks every link to within half of its distance, which takes
-  // little time.
-  QueryConfig first_config() const {
-    QueryConfig first = config;
-    if (config.deadline > 0.0) first.relative_tolerance = std::max(0.5, config.relative_tolerance);
-    return first;
-  }
-
-  // Before any link is searched to its end, every one in `order` gets an obstacle that was
-  // measured, and those that are free are proven to be.
-  void start(SnapshotSpan clouds, Deadline* deadline) {
+  // Asks the links in `order`. Each first gets an obstacle that was measured. With a deadline the
+  // links take turns: those that are free are proven to be, then all distances are known to half,
+  // and each link takes no more than its share of the time that is left; last come all to the
+  // tolerance, those that may be nearest first.
+  // @returns false: the deadline passed first
+  bool run_links(SnapshotSpan clouds, Deadline* deadline) {
     for (const std::size_t i : order) {
       links[i].warm_start(clouds, !deadline->passed_by(kFirstObstacles));
     }
-    if (!(config.deadline > 0.0)) return;
+    if (config.deadline > 0.0) {
+      take_turn(clouds, Goal::kFree, deadline);
+      sort_links([](const LinkQuery& link) { return link.distance(); });
+      take_turn(clouds, Goal::kHalf, deadline);
+      sort_links([](const LinkQuery& link) { return link.proven_bound(); });
+      if (deadline->passed()) return false;
+    }
+    bool complete = true;
+    for (const std::size_t i : order) {
+      complete = links[i].run(clouds, Goal::kTolerance, deadline) && complete;
+    }
+    return complete;
+  }
+
+  void take_turn(SnapshotSpan clouds, Goal goal, Deadline* deadline) {
     std::size_t left = order.size();
     for (const std::size_t i : order) {
       Deadline share(deadline, left--);
-      links[i].prove_free(clouds, &share);
+      links[i].run(clouds, goal, &share);
     }
   }
 
-  // The links that seem to be nearest come first, and none takes more than its share of the time
-  // that is left. Afterwards the links in `order` are sorted by what is proven: those that may be
-  // nearest come first.
-  void run_coarsely(SnapshotSpan clouds, Deadline* deadline) {
-    std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
-      return links[a].distance() < links[b].distance();
-    });
-    std::size_t left = order.size();
-    for (const std::size_t i : order) {
-      Deadline share(deadline, left--);
-      links[i].run(clouds, &share);
-    }
-    std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
-      return links[a].proven_bound() < links[b].proven_bound();
-    });
-    if (deadline->passed()) return;
-    for (const std::size_t i : order) links[i].tighten(config);
+  template <class Key>
+  void sort_links(const Key& key) {
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return key(links[a]) < key(links[b]); });
   }
 
   // Counts a link that a deadline left with wider bounds than were asked for.
@@ -122,7 +108,6 @@ struct ProximityQuery::Impl {
   SceneTracker scene;
   std::size_t last_nearest = 0;  // link that the last run_minimum() found
   QueryStatistics statistics;
-  std::vector<QueryStatistics> link_statistics;
 };
 
 ProximityQuery::ProximityQuery(std::shared_ptr<const RobotModel> model, const QueryConfig& config)
@@ -140,7 +125,6 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   const SceneId scene = impl_->scene.identify(clouds);
   std::vector<std::size_t>& order = impl_->order;
   order.clear();
-  std::fill(impl_->link_statistics.begin(), impl_->link_statistics.end(), QueryStatistics());
   for (std::size_t i = 0; i < count; ++i) {
     if (!impl_->can_query(i, X_FL, known, clouds)) {
       (*results)[i].reset();
@@ -148,21 +132,15 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
       continue;
     }
     order.push_back(i);
-    impl_->links[i].begin(X_FL[i], clouds, scene, impl_->first_config(), {},
-                          &impl_->link_statistics[i], &deadline);
+    impl_->links[i].begin(X_FL[i], clouds, scene, impl_->config, {}, &impl_->statistics, &deadline);
   }
-  impl_->start(clouds, &deadline);
-  if (impl_->config.deadline > 0.0) impl_->run_coarsely(clouds, &deadline);
-  const bool is_stopped = deadline.has_passed();
-  bool complete = !is_stopped;
+  const bool complete = impl_->run_links(clouds, &deadline);
   for (const std::size_t i : order) {
-    if (!is_stopped) complete = impl_->links[i].run(clouds, &deadline) && complete;
     impl_->links[i].answer(clouds, &(*results)[i]);
     if (!complete) {
       impl_->count_unfinished((*results)[i], impl_->links[i].extent_width());
     }
   }
-  impl_->add_up_statistics();
   return complete;
 }
 
@@ -189,7 +167,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
     LinkQuery& link = impl_->links[i];
     link.begin(X_FL[i], clouds, scene, impl_->config, nearest, &impl_->statistics, &deadline);
     if (best == count) link.warm_start(clouds);
-    complete = impl_->links[i].run(clouds, &deadline) && complete;
+    complete = link.run(clouds, Goal::kTolerance, &deadline) && complete;
     all_in_regions = all_in_regions && link.is_inside_regions();
     proven = std::min(proven, link.proven_bound());
     proven_points = std::min(proven_points, link.proven_points_bound());
@@ -231,7 +209,7 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
   impl_->links[link].begin(X_FL, clouds, impl_->scene.identify(clouds), impl_->config, {},
                            &impl_->statistics, &deadline);
   impl_->links[link].warm_start(clouds);
-  const bool complete = impl_->links[link].run(clouds, &deadline);
+  const bool complete = impl_->links[link].run(clouds, Goal::kTolerance, &deadline);
   impl_->links[link].answer(clouds, result);
   return complete;
 }
@@ -245,9 +223,6 @@ void ProximityQuery::set_model(std::shared_ptr<const RobotModel> model) {
 void ProximityQuery::set_config(const QueryConfig& config) { impl_->config = config; }
 const QueryConfig& ProximityQuery::config() const { return impl_->config; }
 const QueryStatistics& ProximityQuery::statistics() const { return impl_->statistics; }
-const std::vector<QueryStatistics>& ProximityQuery::link_statistics() const {
-  return impl_->link_statistics;
-}
 const RobotModel& ProximityQuery::model() const { return *impl_->model; }
 std::size_t ProximityQuery::memory() const {
   std::size_t bytes = sizeof(Impl);

@@ -1,8 +1,6 @@
 #include "ist_proximity/tree/inner_sphere_tree.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
 
 #include "internal/geometry/float_rounding.h"
@@ -13,17 +11,16 @@
 namespace ist {
 namespace {
 
-constexpr auto kWidth = static_cast<std::size_t>(kSphereWidth);
-using Distances = std::array<float, kWidth>;
+using Row = Eigen::Array<float, kSphereWidth, 1>;
 
 // The distances [m] of a point to the spheres of a node or a leaf.
 template <typename Spheres>
-void sphere_distances(const Spheres& spheres, const float* radius, const Eigen::Vector3f& p,
-                      Distances* distance) {
-  for (std::size_t k = 0; k < kWidth; ++k) {
-    const float dx = spheres.x[k] - p.x(), dy = spheres.y[k] - p.y(), dz = spheres.z[k] - p.z();
-    (*distance)[k] = std::sqrt(dx * dx + dy * dy + dz * dz) - radius[k];
-  }
+Row sphere_distances(const Spheres& spheres, const float* radius, const Eigen::Vector3f& p) {
+  const auto row = [](const float* values) { return Eigen::Map<const Row>(values); };
+  return ((row(spheres.x) - p.x()).square() + (row(spheres.y) - p.y()).square() +
+          (row(spheres.z) - p.z()).square())
+             .sqrt() -
+         row(radius);
 }
 
 }  // namespace
@@ -55,9 +52,9 @@ double InnerSphereTree::rounding(const Eigen::Vector3d& p_L) const {
   return 1e-6 * (p_L.cwiseAbs().maxCoeff() + radius_ + center_.norm());
 }
 
-double InnerSphereTree::cover_distance(const Eigen::Vector3d& p_L, double stop_below) const {
-  double nearest = std::numeric_limits<double>::infinity();
-  if (nodes_.empty()) return nearest;
+double InnerSphereTree::cover_distance(const Eigen::Vector3d& p_L, double stop_below,
+                                       double coarse) const {
+  if (nodes_.empty()) return std::numeric_limits<double>::infinity();
   const Eigen::Vector3f p = p_L.cast<float>();
   const double rounding = this->rounding(p_L);
   struct Entry {
@@ -66,26 +63,28 @@ double InnerSphereTree::cover_distance(const Eigen::Vector3d& p_L, double stop_b
   };
   SphereTreeStack<Entry> stack;
   stack.push({0, -std::numeric_limits<float>::max()});
-  Distances distance{};
-  while (!stack.empty()) {
+  float nearest = std::numeric_limits<float>::infinity();
+  while (!stack.empty() && static_cast<double>(nearest) - rounding >= stop_below) {
     const Entry entry = stack.pop();
     if (entry.lower_bound >= nearest) continue;
     if (entry.child < 0) {
       const SphereLeaf& leaf = leaves_[static_cast<std::size_t>(~entry.child)];
-      sphere_distances(leaf, leaf.cover_radius, p, &distance);
-      for (const float d : distance) nearest = std::min(nearest, static_cast<double>(d));
-      if (nearest - rounding < stop_below) break;
+      nearest = std::min(nearest, sphere_distances(leaf, leaf.cover_radius, p).minCoeff());
       continue;
     }
     const SphereNode& node = nodes_[static_cast<std::size_t>(entry.child)];
-    sphere_distances(node, node.radius, p, &distance);
+    const Row distance = sphere_distances(node, node.radius, p);
     const std::size_t first = stack.size();
-    for (std::size_t k = 0; k < static_cast<std::size_t>(node.count); ++k) {
+    for (int k = 0; k < node.count; ++k) {
       if (distance[k] >= nearest) continue;
-      stack.push_least_on_top<&Entry::lower_bound>(first, {node.child[k], distance[k]});
+      if (static_cast<double>(node.radius[k]) <= coarse) {
+        nearest = distance[k];
+      } else {
+        stack.push_least_on_top<&Entry::lower_bound>(first, {node.child[k], distance[k]});
+      }
     }
   }
-  return nearest - rounding;
+  return static_cast<double>(nearest) - rounding;
 }
 
 bool InnerSphereTree::cover_distance_exceeds(const Eigen::Vector3d& p_L, double distance) const {

@@ -71,7 +71,9 @@ class InnerSphereTree {
   /// outside.
   /// @param p_L         [m] link frame
   /// @param stop_below  [m] the search ends, with any value below this, once the minimum is smaller
-  double cover_distance(const Eigen::Vector3d& p_L, double stop_below = -1e30) const;
+  /// @param coarse      [m] bounding spheres up to this radius stand for the spheres in them
+  double cover_distance(const Eigen::Vector3d& p_L, double stop_below = -1e30,
+                        double coarse = 0.0) const;
   /// cover_distance(p_L) > distance [m], found sooner.
   bool cover_distance_exceeds(const Eigen::Vector3d& p_L, double distance) const;
 

@@ -126,7 +126,7 @@ void add_deadline(const DeadlineCost& cost, Sentences* sentences) {
                           : "nothing is known of them";
     sentences->add(ProximityArray::DEGRADED, passed + links(cost.unfinished) +
                                                  " met ~query/tolerance: " + width +
-                                                 "; raise either, or ~packing/max_error");
+                                                 "; raise either");
   }
   if (cost.unblended > 0) {
     sentences->add(ProximityArray::DEGRADED,
