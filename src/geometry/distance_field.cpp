@@ -113,12 +113,6 @@ class DistanceField::Builder {
     return level;
   }
 
-  static std::size_t count(const Level& level) {
-    std::size_t nodes = 1;
-    for (const std::int32_t size : level.size) nodes *= static_cast<std::size_t>(size);
-    return nodes;
-  }
-
   // Measures the nodes of a grid and calls take() with the place of each.
   template <class Take>
   void measure_nodes(const Level& level, const Take& take) {
@@ -128,7 +122,7 @@ class DistanceField::Builder {
         forget();
         for (int x = 0; x < level.size[0]; ++x) {
           watch_.step();
-          const Eigen::Vector3d p_L(node(level, 0, x), node(level, 1, y), node(level, 2, z));
+          const Eigen::Vector3d p_L(level.node(0, x), level.node(1, y), level.node(2, z));
           measure(p_L);
           take(p_L);
         }
@@ -138,7 +132,7 @@ class DistanceField::Builder {
 
   void add_level(const Eigen::AlignedBox3d& box, double cell) {
     const Level level = make_level(box, cell, field_.values_.size());
-    field_.values_.reserve(level.first + count(level) + kPadding);
+    field_.values_.reserve(level.first + level.count() + kPadding);
     const bool is_finest = field_.levels_.empty();
     measure_nodes(level, [&](const Eigen::Vector3d& p_L) {
       field_.values_.push_back(
@@ -155,8 +149,8 @@ class DistanceField::Builder {
     const Level level = make_level(bounds_, cell_for(bounds_, kDepthCell, kMaxDepthNodes), 0);
     std::vector<Eigen::Vector3f> to_surface;
     std::vector<std::uint16_t> balls;
-    to_surface.reserve(count(level));
-    balls.reserve(count(level));
+    to_surface.reserve(level.count());
+    balls.reserve(level.count());
     float largest = 0.0F;
     bool have_surface = true;
     measure_nodes(level, [&](const Eigen::Vector3d& p_L) {
@@ -185,9 +179,6 @@ class DistanceField::Builder {
     field_.depths_ = level;
   }
 
-  static double node(const Level& level, int axis, int i) {
-    return static_cast<double>(level.low[axis]) + i * static_cast<double>(level.cell);
-  }
   static double steps(double distance, double step, double most) {
     return std::clamp(std::floor((distance - kRounding) / step), 0.0, most);
   }

@@ -56,6 +56,7 @@ std::string temporary_name(const std::string& path) {
 bool is_temporary(const fs::path& path) {
   return path.extension() == kTemporary &&
          (path.filename().string().find(".istpack.") != std::string::npos ||
+          path.filename().string().find(".istfield.") != std::string::npos ||
           path.filename().string().find(".istpairs.") != std::string::npos);
 }
 

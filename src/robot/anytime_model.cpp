@@ -114,7 +114,8 @@ AnytimeModel::Ptr AnytimeModel::with_field(std::size_t link,
     const Solid& solid = robot->links[link].solid;
     const auto detail = robot->links[link].field == nullptr ? DistanceField::Detail::kCoarse
                                                             : DistanceField::Detail::kFine;
-    const auto field = std::make_shared<const DistanceField>(solid, detail, callbacks.cancelled);
+    const auto field =
+        Step(model, callbacks).field_of(links_[link].description->geometry, solid, detail);
     for (LinkModel& other : robot->links) {
       if (is_same_solid(other.solid, solid)) other.field = field;
     }

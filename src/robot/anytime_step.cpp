@@ -6,6 +6,8 @@
 #include <iterator>
 #include <numeric>
 
+#include "field_cache.h"
+#include "first_packing.h"
 #include "internal/bvh/build_id.h"
 #include "internal/geometry/cancelled.h"
 #include "internal/geometry/distance_field.h"
@@ -13,7 +15,6 @@
 #include "internal/packing/packing_cache.h"
 #include "internal/robot/link_packing.h"
 #include "internal/robot/threads.h"
-#include "packing_stages.h"
 
 namespace ist {
 namespace {
@@ -108,15 +109,14 @@ void AnytimeModel::Step::forget_unused_shapes() {
   }
 }
 
-void AnytimeModel::Step::add_job(const Link& link, std::size_t element,
-                                 const PackingConfig& stage) {
+void AnytimeModel::Step::add_job(const Link& link, std::size_t element, const PackingConfig& now) {
   PackingJob job;
   job.key = link.keys[element];
   if (!touched_.insert(job.key).second) return;
   job.shape = &link.description->geometry[element].shape;
   if (const auto surface = surface_of(link.solid, element)) job.surface.emplace(*surface);
   job.config = link.configs[element];
-  job.stage = stage;
+  job.now = now;
   job.link = static_cast<std::size_t>(&link - model_->links_.data());
   job.work = packing_work(*job.shape);
   jobs_.push_back(std::move(job));
@@ -129,7 +129,7 @@ void AnytimeModel::Step::add_unknown_shapes(Stage stage) {
       if (model_->shapes_.count(link.keys[e]) > 0) continue;
       const Shape& shape = link.description->geometry[e].shape;
       add_job(link, e,
-              stage == Stage::kFirst ? first_stage(shape, link.configs[e]) : link.configs[e]);
+              stage == Stage::kFirst ? first_packing(shape, link.configs[e]) : link.configs[e]);
     }
   }
 }
@@ -137,12 +137,9 @@ void AnytimeModel::Step::add_unknown_shapes(Stage stage) {
 void AnytimeModel::Step::add_shapes_to_refine(std::size_t index) {
   const Link& link = model_->links_[index];
   for (std::size_t e = 0; e < link.keys.size(); ++e) {
-    const ShapePacking& known = *model_->shapes_.at(link.keys[e]);
-    if (known.is_final) continue;
-    add_job(link, e,
-            known.fell_short ? link.configs[e] : next_stage(known.packing, link.configs[e]));
+    if (!model_->shapes_.at(link.keys[e])->is_final) add_job(link, e, link.configs[e]);
   }
-  for (PackingJob& job : jobs_) job.look_in_cache = false;  // the first stage has looked
+  for (PackingJob& job : jobs_) job.look_in_cache = false;  // the first one has looked
 }
 
 // False when cancelled.
@@ -174,7 +171,6 @@ void AnytimeModel::Step::take(PackingJob* job) {
   } else {
     shape->packing = std::move(job->packing);
     shape->is_final = job->is_final || !job->error.empty();
-    shape->fell_short = job->fell_short;
     shape->from_cache = job->from_cache;
     shape->time = job->time + (known ? known->time : 0.0);
     shape->error = job->error;
@@ -188,7 +184,7 @@ bool AnytimeModel::Step::is_touched(const Link& link) const {
 }
 
 LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before,
-                                       bool same_geometry) const {
+                                       bool same_geometry) {
   LinkModel model;
   model.name = link.name;
   model.error = link.error;
@@ -219,10 +215,39 @@ LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before
   model.solid = link.solid;
   if (before != nullptr && same_geometry) model.field = before->field;
   if (model.field == nullptr && model_->config_.distance_fields) {
-    model.field =
-        std::make_shared<const DistanceField>(model.solid, DistanceField::Detail::kFine, cancelled);
+    model.field = field_of(geometry, model.solid, DistanceField::Detail::kFine);
   }
   return model;
+}
+
+std::shared_ptr<const DistanceField> AnytimeModel::Step::field_of(const LinkGeometry& geometry,
+                                                                  const Solid& solid,
+                                                                  DistanceField::Detail detail) {
+  const std::string key = field_key(geometry);
+  Field* made = nullptr;
+  {
+    const std::lock_guard<std::mutex> lock(fields_mutex_);
+    made = &fields_[key];
+  }
+  std::call_once(made->is_made, [&] {
+    const FieldCache cache(model_->config_.cache_directory);
+    std::string warning;
+    made->field = cache.load(key, solid, &warning);
+    if (!warning.empty()) warn(warning + "; they are measured again");
+    if (made->field) return;
+    made->field =
+        std::make_shared<const DistanceField>(solid, detail, [this] { return is_cancelled(); });
+    warning.clear();
+    if (detail == DistanceField::Detail::kFine) cache.store(key, *made->field, &warning);
+    if (!warning.empty()) warn(warning);
+  });
+  return made->field;
+}
+
+// Links are made by several threads.
+void AnytimeModel::Step::warn(const std::string& warning) const {
+  const std::lock_guard<std::mutex> lock(cancel_mutex_);
+  if (callbacks_.warning) callbacks_.warning(warning);
 }
 
 AnytimeModel::Ptr AnytimeModel::Step::finish(const RobotModel* before, const std::string* changed) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -8,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "internal/geometry/distance_field.h"
 #include "internal/robot/anytime_model.h"
 #include "monitored_links.h"
 #include "packing_jobs.h"
@@ -57,13 +59,20 @@ class AnytimeModel::Step {
 
   void touch(const std::string& key) { touched_.insert(key); }
 
+  /// The distance field of a geometry, the same for equal ones: from the cache, or measured.
+  /// @param detail  of what is measured where the cache has no fine one
+  /// @throws Cancelled
+  std::shared_ptr<const DistanceField> field_of(const LinkGeometry& geometry, const Solid& solid,
+                                                DistanceField::Detail detail);
+
  private:
   Solid solid_of(const Link& link, const LinkModel* before) const;
-  void add_job(const Link& link, std::size_t element, const PackingConfig& stage);
+  void add_job(const Link& link, std::size_t element, const PackingConfig& now);
   void take(PackingJob* job);
-  LinkModel assemble(const Link& link, const LinkModel* before, bool same_geometry) const;
+  LinkModel assemble(const Link& link, const LinkModel* before, bool same_geometry);
   bool is_touched(const Link& link) const;
   void warn(const RobotModel& robot) const;
+  void warn(const std::string& warning) const;
 
   const std::shared_ptr<AnytimeModel> model_;
   const RobotModelCallbacks callbacks_;
@@ -71,6 +80,13 @@ class AnytimeModel::Step {
   std::vector<PackingJob> jobs_;
   double progress_begin_ = 0.0, progress_end_ = 1.0;
   std::set<std::string> touched_;  ///< keys of shapes that have another packing than before
+  struct Field {
+    std::once_flag is_made;
+    std::shared_ptr<const DistanceField> field;
+  };
+  std::mutex fields_mutex_;
+  std::map<std::string, Field>
+      fields_;  ///< by key; guarded by fields_mutex_, but for their content
 };
 
 }  // namespace ist

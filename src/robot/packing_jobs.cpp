@@ -6,9 +6,9 @@
 #include <optional>
 #include <utility>
 
+#include "first_packing.h"
 #include "internal/packing/packer.h"
 #include "internal/robot/threads.h"
-#include "packing_stages.h"
 
 namespace ist {
 
@@ -70,11 +70,9 @@ void PackingJobs::pack(std::size_t index) {
         return !stopped;
       };
       job.packing =
-          pack_element(*job.shape, job.stage, progress, job.surface ? &*job.surface : nullptr);
-      job.is_final = is_final_stage(job.packing, job.stage, job.config);
+          pack_element(*job.shape, job.now, progress, job.surface ? &*job.surface : nullptr);
+      job.is_final = is_final(job.packing, job.now, job.config);
       PackingCertificate& certificate = job.packing.certificate;
-      job.fell_short = certificate.max_gap > job.stage.max_error &&
-                       job.stage.max_spheres == job.config.max_spheres;
       certificate.reached = certificate.max_gap <= job.config.max_error;
       if (!stopped && job.is_final) cache_.store(job.key, job.packing, &job.store_warning);
     }

@@ -20,16 +20,13 @@ struct PackingJob {
   const Shape* shape = nullptr;
   std::optional<MeshSurface> surface;  ///< of a mesh
   PackingConfig config;                ///< of the final packing
-  PackingConfig stage;  ///< what is packed now where the cache does not have the final packing
-  std::string key;      ///< of the final packing
+  PackingConfig now;  ///< what is packed now where the cache does not have the final packing
+  std::string key;    ///< of the final packing
   bool look_in_cache = true;
   std::size_t link = 0;  ///< the first link that needs it
   double work = 1.0;     ///< relative to other jobs
 
   Packing packing;
-  /// The stage has not reached its error although it had all spheres: a limit of the packing, after
-  /// which only the final stage is left.
-  bool fell_short = false;
   bool is_final = false;  ///< `packing` is the final one; only such are kept in the cache
   bool from_cache = false;
   double time = 0.0;  ///< [s]

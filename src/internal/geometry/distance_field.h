@@ -41,10 +41,17 @@ class DistanceField {
  public:
   /// A grid of nodes; x runs fastest.
   struct Level {
-    float low[3];          ///< [m] the first node, in the frame of the solid
-    float cell, per_cell;  ///< [m], [1/m] the edge of a cell
-    std::int32_t size[3];  ///< nodes along each axis, at least 2
-    std::size_t first;     ///< of its nodes in values(), or in one of the arrays below
+    float low[3];                ///< [m] the first node, in the frame of the solid
+    float cell, per_cell;        ///< [m], [1/m] the edge of a cell
+    std::int32_t size[3];        ///< nodes along each axis, at least 2
+    std::size_t first;           ///< of its nodes in values(), or in one of the arrays below
+    std::size_t count() const {  ///< of its nodes
+      return static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) *
+             static_cast<std::size_t>(size[2]);
+    }
+    double node(int axis, int i) const {  ///< [m] the i-th coordinate of its nodes
+      return static_cast<double>(low[axis]) + i * static_cast<double>(cell);
+    }
   };
 
   /// How long the edges of all cells are.
@@ -100,6 +107,9 @@ class DistanceField {
 
  private:
   class Builder;
+  friend class FieldFile;  // which reads and writes the members
+  DistanceField() = default;
+
   std::vector<Level> levels_;
   std::vector<std::uint16_t> values_;
   std::vector<std::uint8_t> outside_;

@@ -25,16 +25,18 @@ class ByteWriter {
     for (int i = 0; i < 3; ++i) f64(v[i]);
   }
   void raw(const char* data, std::size_t size) { bytes_.append(data, size); }
+  /// The lowest `size` bytes of a number.
+  void integer(std::uint64_t value, std::size_t size) {
+    for (std::size_t i = 0; i < size; ++i) {
+      bytes_.push_back(static_cast<char>((value >> (8 * i)) & 0xFFU));
+    }
+  }
   void reserve(std::size_t size) { bytes_.reserve(size); }
 
   std::uint64_t hash(std::uint64_t seed) const { return XXH64(bytes_.data(), bytes_.size(), seed); }
   const std::string& bytes() const { return bytes_; }
 
  private:
-  void integer(std::uint64_t value, int size) {
-    for (int i = 0; i < size; ++i) bytes_.push_back(static_cast<char>((value >> (8 * i)) & 0xFFU));
-  }
-
   std::string bytes_;
 };
 
@@ -55,16 +57,16 @@ class ByteReader {
     at_ += size;
     return bytes_.substr(at_ - size, size);
   }
-
- private:
-  std::uint64_t integer(int size) {
+  std::uint64_t integer(std::size_t size) {
     std::uint64_t value = 0;
-    for (int i = 0; i < size; ++i) {
+    for (std::size_t i = 0; i < size; ++i) {
       value |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes_[at_++])) << (8 * i);
     }
     return value;
   }
+  std::size_t left() const { return bytes_.size() - at_; }  ///< bytes that are not read yet
 
+ private:
   const std::string& bytes_;
   std::size_t at_ = 0;
 };

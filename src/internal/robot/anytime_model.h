@@ -17,10 +17,10 @@ namespace ist {
 constexpr const char* kPending = "it is not ready yet";
 inline bool is_pending(const LinkModel& link) { return link.error == kPending; }
 
-/// A robot model on its way from coarse packings to fine ones, by an anytime algorithm (Dean and
-/// Boddy 1988): it can be used after every step. The certificate of a packing holds at every stage,
-/// so answers are right from the first stage on; queries of coarse packings measure more points
-/// exactly and cost more.
+/// A robot model that can be used after every step of its making, as an anytime algorithm is (Dean
+/// and Boddy 1988): with coarse packings first, then with distance fields, which make queries fast,
+/// and where spheres themselves are needed with final packings. Answers are right from the first
+/// step on.
 ///
 /// Immutable. Each step gives a new model, which shares what has not changed: links keep their
 /// place and their exact geometry, and all but the packed link keep their packing_id. Thread safe.
@@ -33,7 +33,7 @@ class AnytimeModel {
   AnytimeModel& operator=(const AnytimeModel&) = delete;
   ~AnytimeModel();
 
-  /// The stage that shapes are packed to.
+  /// What shapes are packed to.
   enum class Stage {
     kFirst,  ///< a few dozen spheres a shape, unless its final packing is in the cache
     kFinal,  ///< config.packing
@@ -42,7 +42,7 @@ class AnytimeModel {
   /// Takes a model in which some links are pending.
   using Partial = std::function<void(const Ptr&)>;
 
-  /// Packs every monitored link to a stage, equal shapes once, on config.threads threads.
+  /// Packs every monitored link, equal shapes once, on config.threads threads.
   /// @param description  not null
   /// @param partial      not empty: links are made in a few groups, those with the least work
   /// first,
@@ -53,24 +53,25 @@ class AnytimeModel {
                    const RobotModelConfig& config, Stage stage,
                    const RobotModelCallbacks& callbacks = {}, const Partial& partial = {});
 
-  /// Packs the shapes of one link to their next stage, in the calling thread. Other links of the
-  /// same shapes get the packing too. A shape that cannot be packed more finely, for want of memory
-  /// for example, keeps its packing for good, with a warning.
+  /// Packs the shapes of one link to config.packing, in the calling thread. Other links of the
+  /// same shapes get the packing too. A shape that cannot be packed so, for want of memory for
+  /// example, keeps its packing for good, with a warning.
   /// @param link  index in robot(), not final
   /// @returns null when cancelled
   Ptr refined(std::size_t link, const RobotModelCallbacks& callbacks = {}) const;
 
-  /// The same model with the distance field of a link, measured in the calling thread: a coarse one
-  /// where there is none, else a fine one. Other links of the same solid get it too.
+  /// The same model with the distance field of a link: a fine one from the cache, or measured in
+  /// the calling thread, a coarse one where there is none, else a fine one. Other links of the same
+  /// solid get it too.
   /// @param link  index in robot(), usable
   /// @returns null when cancelled
   Ptr with_field(std::size_t link, const RobotModelCallbacks& callbacks = {}) const;
 
-  /// A step that a link can take, what speeds up its queries most for its time first.
+  /// A step that a link can take, in their order.
   enum class LinkStep {
     kCoarseField,  ///< with_field()
     kFineField,    ///< with_field()
-    kSpheres,      ///< refined()
+    kSpheres,      ///< refined(): for contact volumes and the depth of link pairs
     kNone,         ///< the link is complete, or has no geometry
   };
   static LinkStep next_step(const LinkModel& link);
@@ -99,9 +100,8 @@ class AnytimeModel {
   struct ShapePacking {
     Packing packing;
     bool is_final = true, from_cache = false;
-    bool fell_short = false;  ///< see PackingJob
-    double time = 0.0;        ///< [s] of all stages
-    std::string error;        ///< why there is no packing
+    double time = 0.0;  ///< [s]
+    std::string error;  ///< why there is no packing
   };
   struct Link;
   class Step;

@@ -334,7 +334,7 @@ void ProximityCycle::note_usage(const LiveConfig& config) {
   for (const std::size_t i : model_->monitored) {
     const bool is_near = results_[i].state >= LinkState::kNear &&
                          results_[i].lower_bound < config.repulsion.influence_distance;
-    model_->usage->note_query(i, queries_->query().link_statistics()[i], is_near);
+    if (is_near) model_->usage->note_near(i);
   }
 }
 

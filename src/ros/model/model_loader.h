@@ -23,8 +23,8 @@ namespace ist {
 /// Makes the robot's model in a thread of its own: it waits for robot_description on the parameter
 /// server, reads the URDF, and packs its links coarsely or takes them from the cache. After a text
 /// that is no URDF it reads again as soon as the parameter changes. Another thread, of low
-/// priority, packs more finely the links that are near something or costly, for as long as that
-/// pays. All members are thread safe.
+/// priority, measures the distance fields of all links, and packs finely those that need it. All
+/// members are thread safe.
 class ModelLoader {
  public:
   /// @param nh  namespace in which, and above which, `config.robot_description` is searched
@@ -84,7 +84,8 @@ class ModelLoader {
   void wait();
   void run_refinement();
   bool refine_once();
-  std::optional<std::size_t> link_to_refine(const ModelState& state);
+  bool needs_final_packing(const ModelState& state, std::size_t link) const;
+  std::optional<std::size_t> link_to_refine(const ModelState& state) const;
   void take_packings(const ModelState& base, const AnytimeModel::Ptr& refined,
                      const std::vector<std::string>& warnings);
   bool cancelled() const { return stop_ || reload_; }
@@ -104,10 +105,7 @@ class ModelLoader {
   std::atomic<bool> changes_ended_{false};
   std::chrono::steady_clock::time_point change_deadline_;  ///< guarded by change_mutex_
 
-  // Used by the refining thread alone.
-  std::vector<LinkUsage::Need> needs_;  ///< by link, lately
-  std::shared_ptr<LinkUsage> needs_of_;
-  std::vector<std::shared_ptr<const ModelState>> retired_;
+  std::vector<std::shared_ptr<const ModelState>> retired_;  ///< the refining thread's own
 
   std::thread thread_, refining_thread_;
 };

@@ -12,43 +12,35 @@
 #include "ros/common/thread_name.h"
 #include "ros/model/model_loader.h"
 
-// Background work on the model: distance fields, coarse ones of all links first, and finer spheres
-// for the links that need them, one link at a time.
+// Background work on the model: distance fields, coarse ones of all links first, and then final
+// packings of the links that need them, one link at a time.
 
 namespace ist {
 namespace {
 
 constexpr std::chrono::milliseconds kPollNeed(200);
-// Links that nothing is near get finer spheres as long as a query of them measures so many points
-// exactly: finer spheres save little else, and a point costs about a microsecond.
-constexpr double kExactThatPays = 2.0;
 
 }  // namespace
 
-/// The link to refine next: the one whose next step is the most urgent, of these one that something
-/// is near, and of these the one whose queries measure most points exactly. None where no step
-/// would pay.
-std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) {
+/// Contact volumes and the depth of link pairs are as good as the spheres; distances are exact with
+/// any.
+bool ModelLoader::needs_final_packing(const ModelState& state, std::size_t link) const {
+  return config_.self_collision.enabled || config_.contacts_wanted == ContactsWanted::kAll ||
+         (config_.contacts_wanted == ContactsWanted::kAuto && state.usage->was_near(link));
+}
+
+/// The link to refine next, by the order of their next steps. None where nothing is left to do.
+std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) const {
+  using LinkStep = AnytimeModel::LinkStep;
   if (!state.is_ready() || !state.anytime) return std::nullopt;
-  if (needs_.size() != state.usage->size() || needs_of_ != state.usage) {
-    needs_of_ = state.usage;
-    needs_.assign(state.usage->size(), {});
-  }
   std::optional<std::size_t> chosen;
-  const auto next_step = [&](std::size_t i) {
-    return AnytimeModel::next_step(state.robot->links[i]);
-  };
-  const auto is_before = [&](std::size_t a, std::size_t b) {
-    if (next_step(a) != next_step(b)) return next_step(a) < next_step(b);
-    if (needs_[a].is_near != needs_[b].is_near) return needs_[a].is_near;
-    return needs_[a].exact > needs_[b].exact;
-  };
-  for (std::size_t i = 0; i < needs_.size(); ++i) {
-    needs_[i] = state.usage->take(i);
-    if (next_step(i) == AnytimeModel::LinkStep::kNone) continue;
-    const bool pays = needs_[i].is_near || needs_[i].exact >= kExactThatPays ||
-                      config_.self_collision.enabled;  // the width of its answers is the gap
-    if (pays && (!chosen || is_before(i, *chosen))) chosen = i;
+  LinkStep first = LinkStep::kNone;
+  for (std::size_t i = 0; i < state.robot->links.size(); ++i) {
+    const LinkStep step = AnytimeModel::next_step(state.robot->links[i]);
+    const bool is_wanted = step != LinkStep::kSpheres || needs_final_packing(state, i);
+    if (!is_wanted || !(step < first)) continue;
+    first = step;
+    chosen = i;
   }
   return chosen;
 }

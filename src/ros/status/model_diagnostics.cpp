@@ -95,12 +95,12 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
   }
   add_value("links with their final packing",
             std::to_string(final) + " of " + std::to_string(usable) +
-                (final < usable ? "; the others get finer spheres when it pays" : ""),
+                (final < usable ? "; the others get it when contact or link pairs need it" : ""),
             status);
   add_value("links with a distance field",
             std::to_string(fields) + " of " + std::to_string(usable) +
                 (coarse_fields > 0 ? ", " + std::to_string(coarse_fields) + " coarse" : "") +
-                (fields < usable ? "; the others get one when it pays" : ""),
+                (fields < usable ? "; the others will get one" : ""),
             status);
   add_value("spheres", spheres, status);
   const ModelMemory memory = memory_of(*state.robot);
