@@ -262,49 +262,6 @@ TEST_P(CoherentQueries, BoundsHoldOnLongMotions) {
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, CoherentQueries, ::testing::Values(0.0, 0.001, 0.02));
 
-// Steps of a hundredth of the tolerance in contact: of a closed link, the bound of an earlier pose
-// serves most of them. Every answer is checked by brute force.
-TEST(CoherentQueries, ABoundServesManyPosesInContact) {
-  test::Rng rng(66);
-  QueryConfig config;
-  // A search of a field counts its nodes.
-  ProximityQuery query(test::with_fields(links().shared_model()), config);
-  const std::size_t count = shapes().size();
-  const std::vector<bool> known(count, true);
-  std::vector<LinkProximity> results;
-  std::vector<int> in_contact(count), without_traversal(count);
-  for (int trial = 0; trial < test::scaled(40); ++trial) {
-    Poses X_FL(count);
-    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.05);
-    const Points points = random_points(&rng, 200, 0.2);
-    const CloudSnapshot cloud = test::make_snapshot(points);
-    const Eigen::Vector3d axis = test::random_vector(&rng, 1.0).normalized();
-    const Eigen::Vector3d way = 0.01 * config.tolerance * test::random_vector(&rng, 1.0);
-    for (int step = 0; step < 30; ++step) {
-      query.run(X_FL, known, {&cloud}, &results);
-      for (std::size_t i = 0; i < count; ++i) {
-        const test::Truth truth = test::truth_of(links().link(i), X_FL[i], points, cloud);
-        test::expect_truth(results[i], truth, config, X_FL[i]);
-        if (step == 0 || results[i].state != LinkState::kContact) continue;
-        ++in_contact[i];
-        const QueryStatistics& link = query.link_statistics()[i];
-        without_traversal[i] += link.node_pairs + link.leaf_pairs == 0 ? 1 : 0;
-      }
-      for (Eigen::Isometry3d& X : X_FL) {
-        X = displaced(X, Eigen::Vector3d::Zero(), 1e-5, axis, way);
-      }
-    }
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    EXPECT_GT(in_contact[i], test::scaled(200)) << "shape " << i;
-    if (links().model().links[i].solid.is_closed()) {
-      EXPECT_GT(without_traversal[i], in_contact[i] / 2) << "shape " << i;
-    } else {
-      EXPECT_EQ(without_traversal[i], 0) << "a point may come in through a hole";
-    }
-  }
-}
-
 // A deadline may stop a query anywhere. The bounds of this query and of later ones hold.
 TEST(CoherentQueries, BoundsHoldAfterDeadlines) {
   Motion motion(63);
