@@ -184,7 +184,11 @@ struct LinkSearch : SearchResult {
   bool has_time(double bound) const {
     if (goal == Goal::kFree && bound > 0.0) return false;
     if (!deadline->passed()) return true;
-    return !(bound > 0.0) && closest.exact.distance > 0.0 && !deadline->passed_by(kFirstBounds);
+    // The first turn is followed by an obstacle, which is worth more than a bound.
+    const double distance = closest.exact.distance;
+    const bool is_followed =
+        goal == Goal::kFree && distance == std::numeric_limits<double>::infinity();
+    return !(bound > 0.0) && distance > 0.0 && !is_followed && !deadline->passed_by(kFirstBounds);
   }
   void prune(double bound) { pruned_bound = std::min(pruned_bound, bound); }
 

@@ -51,17 +51,21 @@ struct ProximityQuery::Impl {
     return fits && known[i] && can_query(i, X_FL[i], clouds);
   }
 
-  // Asks the links in `order`. Each first gets an obstacle that was measured. With a deadline the
-  // links take turns: those that are free are proven to be, then all distances are known to half,
-  // and each link takes no more than its share of the time that is left; last come all to the
-  // tolerance, those that may be nearest first.
+  // Asks the links in `order`. With a deadline they take turns: those that are free are proven to
+  // be, and each gets an obstacle that was measured; then all distances are known to half, and each
+  // link takes no more than its share of the time that is left; last come all to the tolerance,
+  // those that may be nearest first.
   // @returns false: the deadline passed first
   bool run_links(SnapshotSpan clouds, Deadline* deadline) {
+    if (config.deadline > 0.0) {
+      for (const std::size_t i : order) links[i].warm_start(clouds, false);
+      take_turn(clouds, Goal::kFree, deadline);
+    }
     for (const std::size_t i : order) {
+      if (links[i].distance() < kInfinity) continue;
       links[i].warm_start(clouds, !deadline->passed_by(kFirstObstacles));
     }
     if (config.deadline > 0.0) {
-      take_turn(clouds, Goal::kFree, deadline);
       sort_links([](const LinkQuery& link) { return link.distance(); });
       take_turn(clouds, Goal::kHalf, deadline);
       sort_links([](const LinkQuery& link) { return link.proven_bound(); });
@@ -75,9 +79,10 @@ struct ProximityQuery::Impl {
   }
 
   void take_turn(SnapshotSpan clouds, Goal goal, Deadline* deadline) {
-    std::size_t left = order.size();
+    // The first turn leaves half of the time to obstacles.
+    std::size_t left = order.size(), parts = goal == Goal::kFree ? 2 : 1;
     for (const std::size_t i : order) {
-      Deadline share(deadline, left--);
+      Deadline share(deadline, parts * left--);
       links[i].run(clouds, goal, &share);
     }
   }
