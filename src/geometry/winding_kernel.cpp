@@ -49,6 +49,10 @@ double HalfAngle(const TriangleBvh::Triangle& triangle, const Eigen::Vector3d& p
 // A phasor smaller than this share of the lengths' product is the difference of much larger terms:
 // a sliver seen from nearby, or a point next to an edge. In float its sign would be random.
 constexpr float kCancelled = 1e-3F;
+// Float moves a corner or a point by less than 2e-7 of the hierarchy's radius, and a phasor by that
+// times the products of two lengths. A phasor that is no larger than so many times its error is
+// computed in double.
+constexpr double kCornerError = 2e-7, kTimesError = 100.0;
 
 // The terms of all lanes of a vector.
 struct LaneTerms {
@@ -62,19 +66,24 @@ void AddInDouble(const TriangleBvh::View& bvh, const TriangleBvh::Leaf& leaf,
                  Angles* angles) {
   for (std::size_t lane = 0; lane < hn::Lanes(FloatTag()); ++lane) {
     if (terms.fits[lane] != 0.0F) continue;
-    angles->sum +=
-        terms.is_precise[lane] != 0.0F
-            ? std::atan2(static_cast<double>(terms.im[lane]), static_cast<double>(terms.re[lane]))
-            : HalfAngle(bvh.triangles[leaf.first + k + lane], p_M);
+    if (terms.is_precise[lane] != 0.0F) {
+      angles->sum +=
+          std::atan2(static_cast<double>(terms.im[lane]), static_cast<double>(terms.re[lane]));
+    } else if (k + lane < leaf.count) {
+      angles->sum += HalfAngle(bvh.triangles[leaf.first + k + lane], p_M);
+    }
     angles->sum += std::atan2(static_cast<double>(angles->im[k + lane]),
                               static_cast<double>(angles->re[k + lane]));
   }
 }
 
-// Adds half the solid angle of each triangle, as a phasor (van Oosterom and Strackee 1983).
+// Adds half the solid angle of each triangle, as a phasor (van Oosterom and Strackee 1983). A half
+// angle of more than 90 degrees is computed in double: its point is so near the triangle that the
+// side of the plane decides between inside and outside.
 HWY_INLINE void AddTriangles(const TriangleBvh::View& bvh, const TriangleBvh::Leaf& leaf,
                              const Eigen::Vector3d& p_M, const float* p, Angles* angles) {
   const FloatTag d;
+  const auto lost = hn::Set(d, static_cast<float>(kTimesError * kCornerError * bvh.radius));
   for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
     const auto px = hn::Set(d, p[0]), py = hn::Set(d, p[1]), pz = hn::Set(d, p[2]);
     const auto load = [&](int row) { return hn::Load(d, leaf.corner[row] + k); };
@@ -89,7 +98,8 @@ HWY_INLINE void AddTriangles(const TriangleBvh::View& bvh, const TriangleBvh::Le
     const auto ny = hn::Sub(hn::Mul(bz, cx), hn::Mul(bx, cz));
     const auto nz = hn::Sub(hn::Mul(bx, cy), hn::Mul(by, cx));
     const auto det = Dot(ax, ay, az, nx, ny, nz);
-    const auto lengths = hn::Mul(hn::Mul(la, lb), lc);
+    const auto lab = hn::Mul(la, lb), lengths = hn::Mul(lab, lc);
+    const auto areas = hn::MulAdd(hn::Add(la, lb), lc, lab);
     const auto side =
         hn::Add(lengths, hn::MulAdd(Dot(ax, ay, az, bx, by, bz), lc,
                                     hn::MulAdd(Dot(bx, by, bz, cx, cy, cz), la,
@@ -98,7 +108,8 @@ HWY_INLINE void AddTriangles(const TriangleBvh::View& bvh, const TriangleBvh::Le
     const auto zero = hn::Zero(d);
     const auto size = hn::Add(hn::Abs(det), hn::Abs(side));
     const auto is_something = hn::Ne(det, zero);
-    const auto is_precise = hn::Ge(size, hn::Mul(hn::Set(d, kCancelled), lengths));
+    const auto least = hn::MulAdd(lost, areas, hn::Mul(hn::Set(d, kCancelled), lengths));
+    const auto is_precise = hn::And(hn::Ge(size, least), hn::Gt(side, zero));
     const auto scale =
         hn::Div(hn::Set(d, 1.0F), hn::IfThenElse(is_something, size, hn::Set(d, 1.0F)));
     const auto re = hn::IfThenElse(is_something, hn::Mul(side, scale), hn::Set(d, 1.0F));
