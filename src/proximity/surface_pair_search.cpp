@@ -130,9 +130,11 @@ void SurfacePairSearch::sort_front() {
 
 void SurfacePairSearch::rebase_path() {
   // A key that was below the path by now proves nothing.
+  const auto rebase = [this](double* key) { *key = *key > path_ ? *key - path_ : kUnproven; };
   for (std::vector<Entry>* entries : {&queue_, &kept_}) {
-    for (Entry& entry : *entries) entry.key = entry.key > path_ ? entry.key - path_ : kUnproven;
+    for (Entry& entry : *entries) rebase(&entry.key);
   }
+  rebase(&least_kept_);
   plane_bound_ -= path_ - plane_path_;
   path_ = plane_path_ = 0.0;
 }
