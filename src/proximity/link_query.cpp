@@ -261,7 +261,7 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   const ClosestObstacle& closest = search.closest;
   const double distance = closest.exact.distance;
   // Written so that nothing is in range of a pose that is not finite.
-  if (!(distance <= search.range()) || is_clear_of_extents()) {
+  if (!is_in_range()) {
     // UNKNOWN where nothing was measured and not all is known.
     if (!search.is_complete || !is_inside_regions()) return;
     result->state = LinkState::kClear;

@@ -178,8 +178,8 @@ double LinkQuery::radius_of_closest(SnapshotSpan clouds) const {
   return link_extent(cloud, link_).radius((closest.p_FCo - cloud.extent.p_FS).norm());
 }
 
-// Calls visit(obstacles, measure) for every index, until it returns false. The indices whose
-// spheres cannot matter leave their bound.
+// Calls visit(obstacles, measure) for every index, until it returns false. The indices that are
+// left then, and those whose spheres cannot matter, leave their bound.
 // @returns whether it never did
 template <class Visit>
 bool LinkQuery::for_each_extent(SnapshotSpan clouds, const Visit& visit, ExtentSearch* spheres) {
@@ -197,13 +197,16 @@ bool LinkQuery::for_each_extent(SnapshotSpan clouds, const Visit& visit, ExtentS
     const CloudSnapshot& cloud = *clouds[i];
     const LinkExtent extent = link_extent(cloud, link_);
     const auto visit_index = [&](const auto& obstacles) {
-      if (!visited_all) return;
       using Obstacles = std::decay_t<decltype(obstacles)>;
       constexpr bool kPoints = std::is_same_v<Obstacles, PointObstacles>;
       const double within =
           kPoints ? extent.largest_radius_within(spheres->limit()) : cloud.box_extent;
       const double beyond =
           kPoints ? extent.largest_radius_beyond(spheres->points_bound) : cloud.box_extent;
+      if (!visited_all) {
+        spheres->refined = std::min(spheres->refined, spheres->points_bound - beyond);
+        return;
+      }
       if (!matters(within, beyond)) return;
       ExtentMeasure<Obstacles> measure(obstacles, extent, cloud.box_extent, &link_, spheres);
       visited_all = visit(obstacles, &measure);

@@ -160,7 +160,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   LinkQuery::OtherLinks nearest;
   double proven = kInfinity, proven_points = kInfinity;
   std::size_t best = count;
-  bool complete = true, all_in_regions = true;
+  bool complete = true, all_in_regions = true, best_in_range = false;
   // The link that was nearest last time comes first: its upper bound prunes most of the others.
   const std::size_t first = impl_->last_nearest;
   for (std::size_t k = 0; k < count; ++k) {
@@ -177,10 +177,13 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
     proven = std::min(proven, link.proven_bound());
     proven_points = std::min(proven_points, link.proven_points_bound());
     nearest.extents = std::min(nearest.extents, link.extent_distance());
-    if (best == count || link.distance() < nearest.distance) {
+    // With extents a link in range may have a nearest point that is farther than another link's.
+    const bool is_nearer = link.distance() < nearest.distance;
+    if (best == count || (link.is_in_range() == best_in_range ? is_nearer : !best_in_range)) {
       best = i;
-      nearest.distance = link.distance();
+      best_in_range = link.is_in_range();
     }
+    if (is_nearer) nearest.distance = link.distance();
   }
   if (best == count) return complete;
   impl_->links[best].answer(clouds, &result->nearest);

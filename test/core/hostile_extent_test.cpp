@@ -146,6 +146,73 @@ TEST(HostileExtent, NoBoundIsAboveTheSpheres) {
   EXPECT_GT(near, wanted / 10);
 }
 
+// The nearest point of all is out of range, a sphere about another link's point is in it. The
+// answer for the nearest link was CLEAR.
+TEST(HostileExtent, TheNearestLinkIsThatOfASphereInRange) {
+  const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}}, 0.005);
+  Poses X_FL(2, Eigen::Isometry3d::Identity());
+  X_FL[1].translation().x() = 10.0;
+  std::vector<CloudSnapshot> clouds = {test::make_snapshot({{0.0, 1.3, 0.0}}),
+                                       test::make_snapshot({{10.0, 1.6, 0.0}})};
+  clouds[1].extent.constant = 0.8;
+  clouds[1].extent.max_range = 20.0;
+  QueryConfig config;
+  config.max_distance = 1.0;
+  ProximityQuery query(model, config);
+  for (int again = 0; again < 3; ++again) {
+    RobotProximity found;
+    ASSERT_TRUE(query.run_minimum(X_FL, {true, true}, {&clouds[0], &clouds[1]}, &found));
+    EXPECT_EQ(found.nearest.state, LinkState::kNear);
+    EXPECT_EQ(found.link, 1);
+    EXPECT_NEAR(found.nearest.lower_bound, 0.7, config.tolerance + 1e-6);
+  }
+}
+
+// A deadline that ends the search of one cloud leaves the other one: its sphere is the nearest one,
+// though its point is not. Bounds were up to 0.22 m above the truth.
+TEST(HostileExtent, ADeadlineLeavesNoCloudOut) {
+  test::Rng rng(20252);
+  const std::vector<Shape> shapes = {Box{{0.2, 0.1, 0.3}}};
+  const auto model = test::make_model(shapes, 0.005);
+  int unfinished = 0;
+  for (int scene = 0; scene < 20; ++scene) {
+    std::vector<Cloud> clouds(2);
+    for (int i = 0; i < 600; ++i) {
+      const double range = test::uniform(&rng, 0.8, 1.2);
+      clouds[0].points.push_back(range * test::random_vector(&rng, 1.0).normalized());
+    }
+    clouds[1].points = {1.3 * test::random_vector(&rng, 1.0).normalized()};
+    for (Cloud& cloud : clouds) {
+      cloud.snapshot = test::make_snapshot(cloud.points);
+      cloud.snapshot.extent.p_FS = test::random_vector(&rng, 0.3);
+      cloud.snapshot.extent.max_range = 3.0;
+    }
+    clouds[0].snapshot.extent.linear = 0.2;
+    clouds[1].snapshot.extent.constant = 0.8;
+    const double truth = truth_of(test::one(shapes[0]), Eigen::Isometry3d::Identity(), clouds);
+    QueryConfig config;
+    config.deadline = 3600.0;
+    config.max_distance = 2.0;
+    for (int asks = 0; asks < 120; ++asks) {
+      ProximityQuery query(model, config);
+      const Poses X_FL = {Eigen::Isometry3d::Identity()};
+      std::vector<LinkProximity> results;
+      RobotProximity nearest;
+      for (const bool is_minimum : {false, true}) {
+        Deadline::asks_left_for_test = asks;
+        const std::vector<const CloudSnapshot*> all = {&clouds[0].snapshot, &clouds[1].snapshot};
+        const bool is_whole = is_minimum ? query.run_minimum(X_FL, {true}, all, &nearest)
+                                         : query.run(X_FL, {true}, all, &results);
+        Deadline::asks_left_for_test = -1;
+        unfinished += is_whole ? 0 : 1;
+        const LinkProximity& found = is_minimum ? nearest.nearest : results[0];
+        ASSERT_LE(found.lower_bound, truth + 1e-9) << scene << ", " << asks << ", " << is_minimum;
+      }
+    }
+  }
+  EXPECT_GT(unfinished, 100);
+}
+
 // A bound holds for spheres that are nearer than the range of its query. Of a cloud that is not
 // searched, because no sphere of it matters within that range, larger spheres may be farther out:
 // B's at 1.14 m, where its largest radius within 1 m says 1.165 m. The next pose is 0.2 m nearer.
