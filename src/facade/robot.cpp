@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -87,6 +88,7 @@ struct Robot::Impl {
     for (const LinkModel& link : parts.model->links) links.push_back(link.name);
     for (std::size_t j = 0; j < kinematics->joints().size(); ++j) {
       const Kinematics::Joint& joint = kinematics->joints()[j];
+      if (joint.source != j) mimics.push_back(j);
       if (!joint.is_free()) continue;
       joints.push_back(joint.name);
       free_joints.push_back(j);
@@ -105,25 +107,63 @@ struct Robot::Impl {
   }
 
   void check_single(Span<const double> q) const {
-    if (q.size() == joints.size()) return;
+    if (q.size() == joints.size() || q.size() == joints.size() + mimics.size()) return;
     throw std::invalid_argument("the robot has " + std::to_string(joints.size()) +
                                 " joints with a position of their own; " +
                                 std::to_string(q.size()) + " positions were given");
   }
 
-  const LinkPoses& place(Span<const double> q, std::size_t k, QueryWorker* worker) const {
+  /// @param q  one configuration; with or without positions of the mimic joints
+  const LinkPoses& place(Span<const double> q, QueryWorker* worker) const {
+    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t j = 0; j < free_joints.size(); ++j) {
-      const double position = q[k * free_joints.size() + j];
-      worker->q[free_joints[j]] =
-          std::isfinite(position) ? position : std::numeric_limits<double>::quiet_NaN();
+      worker->q[free_joints[j]] = std::isfinite(q[j]) ? q[j] : kNaN;
+    }
+    const bool states_mimics = q.size() > free_joints.size();
+    for (std::size_t m = 0; m < mimics.size(); ++m) {
+      worker->q[mimics[m]] = states_mimics ? q[free_joints.size() + m] : kNaN;
     }
     return worker->forward.run(worker->q);
+  }
+
+  /// Calls answer(worker, poses, k) for each of n configurations.
+  template <class Answer>
+  void for_each(Span<const double> q, std::size_t n, const BatchConfig& config,
+                const Answer& answer) const {
+    const std::size_t size = n > 0 ? q.size() / n : 0;
+    pool.run(n, config.threads, config.query, [&](QueryWorker* worker, std::size_t k) {
+      answer(worker, place({q.data() + k * size, size}, worker), k);
+    });
+  }
+
+  std::vector<LinkProximity> distances(Span<const double> q, std::size_t n,
+                                       const Obstacles& obstacles,
+                                       const BatchConfig& config) const {
+    check(config.query);
+    std::vector<LinkProximity> results(n * links.size());
+    for_each(q, n, config, [&](QueryWorker* worker, const LinkPoses& poses, std::size_t k) {
+      worker->query.run(poses.X_FL, poses.known, {&obstacles.snapshot()}, &worker->results);
+      std::copy(worker->results.begin(), worker->results.end(),
+                results.begin() + static_cast<std::ptrdiff_t>(k * links.size()));
+    });
+    return results;
+  }
+
+  std::vector<RobotProximity> nearest(Span<const double> q, std::size_t n,
+                                      const Obstacles& obstacles, const BatchConfig& config) const {
+    check(config.query);
+    std::vector<RobotProximity> results(n);
+    for_each(q, n, config, [&](QueryWorker* worker, const LinkPoses& poses, std::size_t k) {
+      worker->query.run_minimum(poses.X_FL, poses.known, {&obstacles.snapshot()}, &results[k]);
+    });
+    return results;
   }
 
   RobotParts parts;
   std::shared_ptr<const Kinematics> kinematics;
   std::vector<std::string> links, joints;
   std::vector<std::size_t> free_joints;  // by joint: its index in the kinematics
+  std::vector<std::size_t> mimics;       // indices in the kinematics
   std::vector<double> lower, upper;      // by joint
   mutable QueryPool pool;
 };
@@ -169,14 +209,24 @@ const std::shared_ptr<const Kinematics>& Robot::kinematics() const { return impl
 
 std::vector<double> Robot::configuration(const std::map<std::string, double>& positions,
                                          double other) const {
+  const std::vector<std::size_t>& mimics = impl_->mimics;
   std::vector<double> q(joints().size(), other);
   for (const auto& [joint, position] : positions) {
     const auto found = std::find(joints().begin(), joints().end(), joint);
-    if (found == joints().end()) {
-      throw std::invalid_argument("robot '" + name() + "' has no joint '" + printable(joint) +
-                                  "' with a position of its own");
+    if (found != joints().end()) {
+      q[static_cast<std::size_t>(found - joints().begin())] = position;
+      continue;
     }
-    q[static_cast<std::size_t>(found - joints().begin())] = position;
+    const std::optional<std::size_t> at = kinematics()->find_joint(joint);
+    const auto mimic = at ? std::find(mimics.begin(), mimics.end(), *at) : mimics.end();
+    if (mimic == mimics.end()) {
+      throw std::invalid_argument("robot '" + name() + "' has no joint '" + printable(joint) +
+                                  "' with a position");
+    }
+    q.resize(joints().size() + mimics.size(), std::numeric_limits<double>::quiet_NaN());
+    // NaN follows the other joint: what is stated and not known must not.
+    q[joints().size() + static_cast<std::size_t>(mimic - mimics.begin())] =
+        std::isfinite(position) ? position : std::numeric_limits<double>::infinity();
   }
   return q;
 }
@@ -184,48 +234,31 @@ std::vector<double> Robot::configuration(const std::map<std::string, double>& po
 LinkPoses Robot::link_poses(Span<const double> q) const {
   impl_->check_single(q);
   LinkPoses poses;
-  impl_->pool.run(1, 1, {},
-                  [&](QueryWorker* worker, std::size_t k) { poses = impl_->place(q, k, worker); });
+  impl_->for_each(q, 1, {{}, 1},
+                  [&](QueryWorker*, const LinkPoses& placed, std::size_t) { poses = placed; });
   return poses;
 }
 
 std::vector<LinkProximity> Robot::distances(Span<const double> q, const Obstacles& obstacles,
                                             const QueryConfig& config) const {
   impl_->check_single(q);
-  return distances_batch(q, obstacles, {config, 1});
+  return impl_->distances(q, 1, obstacles, {config, 1});
 }
 
 RobotProximity Robot::nearest(Span<const double> q, const Obstacles& obstacles,
                               const QueryConfig& config) const {
   impl_->check_single(q);
-  return nearest_batch(q, obstacles, {config, 1}).front();
+  return impl_->nearest(q, 1, obstacles, {config, 1}).front();
 }
 
 std::vector<LinkProximity> Robot::distances_batch(Span<const double> q, const Obstacles& obstacles,
                                                   const BatchConfig& config) const {
-  check(config.query);
-  const std::size_t n = impl_->count(q), links = impl_->links.size();
-  std::vector<LinkProximity> results(n * links);
-  const auto answer = [&](QueryWorker* worker, std::size_t k) {
-    const LinkPoses& poses = impl_->place(q, k, worker);
-    worker->query.run(poses.X_FL, poses.known, {&obstacles.snapshot()}, &worker->results);
-    std::copy(worker->results.begin(), worker->results.end(),
-              results.begin() + static_cast<std::ptrdiff_t>(k * links));
-  };
-  impl_->pool.run(n, config.threads, config.query, answer);
-  return results;
+  return impl_->distances(q, impl_->count(q), obstacles, config);
 }
 
 std::vector<RobotProximity> Robot::nearest_batch(Span<const double> q, const Obstacles& obstacles,
                                                  const BatchConfig& config) const {
-  check(config.query);
-  std::vector<RobotProximity> results(impl_->count(q));
-  const auto answer = [&](QueryWorker* worker, std::size_t k) {
-    const LinkPoses& poses = impl_->place(q, k, worker);
-    worker->query.run_minimum(poses.X_FL, poses.known, {&obstacles.snapshot()}, &results[k]);
-  };
-  impl_->pool.run(results.size(), config.threads, config.query, answer);
-  return results;
+  return impl_->nearest(q, impl_->count(q), obstacles, config);
 }
 
 std::vector<LinkProximity> Robot::distances_at(Span<const Eigen::Isometry3d> X_FL,

@@ -27,15 +27,14 @@ double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion) {
   return std::isfinite(change) ? std::abs(change) / motion.duration : 0.0;
 }
 
-JointMotion with_mimics(const Kinematics& kinematics, JointMotion motion) {
-  for (std::size_t j = 0; j < motion.from.size(); ++j) {
+void place_mimics(const Kinematics& kinematics, JointMotion* motion) {
+  for (std::size_t j = 0; j < motion->from.size(); ++j) {
     const Kinematics::Joint& joint = kinematics.joints()[j];
     if (joint.source == j) continue;
-    for (std::vector<double>* q : {&motion.from, &motion.to}) {
+    for (std::vector<double>* q : {&motion->from, &motion->to}) {
       if (std::isnan((*q)[j])) (*q)[j] = joint.multiplier * (*q)[joint.source] + joint.offset;
     }
   }
-  return motion;
 }
 
 MotionBound::MotionBound(const Kinematics& kinematics, const JointMotion& motion,

@@ -20,7 +20,7 @@ namespace ist {
 /// farther than a h + b h^2 / 2, with a the speed at the start and b the growth of that speed.
 class MotionBound {
  public:
-  /// @param motion          of with_mimics()
+  /// @param motion          after place_mimics()
   /// @param center, radius  [m] the body's bounding sphere, in the body's frame
   /// @param ancestor  a body that this one hangs on: the motion is that in its frame
   MotionBound(const Kinematics& kinematics, const JointMotion& motion, const JointPoses& still,
@@ -56,8 +56,8 @@ class MotionBound {
 /// rounding; +inf for a speed of 0.
 double time_within(double distance, double speed, double growth);
 
-/// The motion with the positions of all mimic joints, which the functions here read.
-JointMotion with_mimics(const Kinematics& kinematics, JointMotion motion);
+/// Sets the positions of mimic joints that follow, which the functions here read.
+void place_mimics(const Kinematics& kinematics, JointMotion* motion);
 
 /// How fast [rad/s, m/s] the motion moves a joint, mimic joints included; 0: not at all.
 double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion);

@@ -134,6 +134,7 @@ struct TimeOfImpact::Impl {
   CarriedWorlds carried;
 
   // Buffers of one call.
+  JointMotion full_motion;  // with the positions of mimic joints
   std::vector<bool> moving;  // by link: the one that is being advanced
   JointPoses moved;
   std::vector<MotionBound> carried_bounds;  // by frame of what the robot carries
@@ -178,7 +179,9 @@ void TimeOfImpact::run(const JointMotion& stated, const JointPoses& still,
                     still.known.size() == joints;
   if (!worlds.empty() && !impl_->worlds) return;
   if (!fits || !(stated.duration > 0.0) || !std::isfinite(stated.duration)) return;
-  const JointMotion motion = with_mimics(impl_->forward.kinematics(), stated);
+  JointMotion& motion = impl_->full_motion;
+  motion = stated;
+  place_mimics(impl_->forward.kinematics(), &motion);
   impl_->carried.take(worlds, impl_->forward.kinematics());
   impl_->bound_carried(motion, still);
   for (std::size_t i = 0; i < count; ++i) {

@@ -101,6 +101,7 @@ struct TimeOfSelfImpact::Impl {
   std::vector<std::unique_ptr<SelfQuery>> queries;  // by pair
 
   // Buffers of one call.
+  JointMotion full_motion;  // with the positions of mimic joints
   JointPoses moved;
   std::vector<PairProximity> answer;
 };
@@ -129,7 +130,9 @@ void TimeOfSelfImpact::run(const JointMotion& stated, const JointPoses& still,
                     stated.to.size() == joints && still.X_PC.size() == joints &&
                     still.known.size() == joints;
   if (!fits || !(stated.duration > 0.0) || !std::isfinite(stated.duration)) return;
-  const JointMotion motion = with_mimics(impl_->forward.kinematics(), stated);
+  JointMotion& motion = impl_->full_motion;
+  motion = stated;
+  place_mimics(impl_->forward.kinematics(), &motion);
   const auto can_measure = [&](std::size_t link) {
     return link < impl_->model->links.size() && impl_->model->links[link].usable() &&
            impl_->forward.body(link).has_value();

@@ -116,19 +116,19 @@ Robot make(const py::object& urdf, const std::string& geometry, double max_error
   return robot;
 }
 
-/// Configurations as rows; a dictionary names joints, the others are at 0.
+/// Configurations as rows; a dictionary names joints, the others are at 0, or follow.
 struct Configurations {
   Configurations(const Robot& robot, const py::object& q) {
     if (py::isinstance<py::dict>(q)) {
       const std::vector<double> one =
           robot.configuration(py::cast<std::map<std::string, double>>(q));
       array = DoubleArray(static_cast<py::ssize_t>(one.size()), one.data());
-    } else {
-      array = DoubleArray::ensure(q);
-      if (!array) {
-        PyErr_Clear();
-        throw py::type_error("q is an array of numbers, or a dictionary by joint names");
-      }
+      return;
+    }
+    array = DoubleArray::ensure(q);
+    if (!array) {
+      PyErr_Clear();
+      throw py::type_error("q is an array of numbers, or a dictionary by joint names");
     }
     const auto joints = static_cast<py::ssize_t>(robot.joints().size());
     if (array.ndim() != 1 && array.ndim() != 2) check_shape(array, 2, joints, kWhat);
@@ -244,12 +244,14 @@ Distances distances_at(const Robot& robot, const DoubleArray& poses, const PyObs
 
 py::object link_poses(const Robot& robot, const py::object& q) {
   const Configurations configurations(robot, q);
-  const std::size_t links = robot.links().size(), joints = robot.joints().size();
+  const Span<const double> values = configurations.values();
+  const std::size_t links = robot.links().size();
   const std::size_t n =
       configurations.shape.empty() ? 1 : static_cast<std::size_t>(configurations.shape[0]);
+  const std::size_t size = n > 0 ? values.size() / n : 0;
   std::vector<LinkPoses> poses;
   for (std::size_t k = 0; k < n; ++k) {
-    poses.push_back(robot.link_poses({configurations.values().data() + k * joints, joints}));
+    poses.push_back(robot.link_poses({values.data() + k * size, size}));
   }
   Shape shape = configurations.shape;
   for (const std::size_t size : {links, std::size_t{4}, std::size_t{4}}) {
@@ -329,11 +331,13 @@ void define_robot(py::module_* module) {
                        const py::gil_scoped_release unlocked;
                        return Robot::from_bytes(bytes);
                      }));
-  define_query(&type, "distances", &distances,
-               with_query("Distances of all links.\n\nq: (joints,) or (n, joints) [rad, m], or a "
-                          "dictionary by joint names; joints that it leaves out are at 0.")
-                   .c_str(),
-               py::arg("q"));
+  define_query(
+      &type, "distances", &distances,
+      with_query("Distances of all links.\n\nq: (joints,) or (n, joints) [rad, m], or a "
+                 "dictionary by joint names; joints that it leaves out are at 0, and mimic "
+                 "joints follow.")
+          .c_str(),
+      py::arg("q"));
   define_query(
       &type, "nearest", &nearest,
       with_query(

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -173,6 +174,45 @@ std::string argument_error(const Call& call) {
     return error.what();
   }
   return "(no error)";
+}
+
+// A finger that follows another one, along x; the other one moves along y, out of the way.
+TEST(Facade, AStatedMimicJointCounts) {
+  const std::string ball = "<collision><geometry><sphere radius='0.05'/></geometry></collision>";
+  const auto slide = [](const std::string& name, const std::string& axis, const std::string& more) {
+    return "<joint name='" + name + "' type='prismatic'><parent link='hand'/><child link='" + name +
+           "_link'/><axis xyz='" + axis +
+           "'/><limit lower='-1' upper='1' velocity='1' effort='1'/>" + more + "</joint>";
+  };
+  const Robot hand(
+      "<robot name='hand'><link name='hand'/><link name='left_link'>" + ball +
+      "</link><link name='right_link'>" + ball + "</link>" + slide("left", "0 1 0", "") +
+      slide("right", "1 0 0", "<mimic joint='left' multiplier='2' offset='-0.1'/>") + "</robot>");
+  ASSERT_EQ(hand.joints(), std::vector<std::string>{"left"});
+  const std::size_t right = hand.links()[0] == "right_link" ? 0 : 1;
+  const Obstacles obstacles(std::vector<Eigen::Vector3f>{{0.5F, 0.0F, 0.0F}});
+  QueryConfig exact;
+  exact.tolerance = 0.0;
+  const auto distance = [&](const std::map<std::string, double>& positions) {
+    const std::vector<double> q = hand.configuration(positions);
+    const LinkProximity answer = hand.distances(q, obstacles, exact)[right];
+    const RobotProximity nearest = hand.nearest(q, obstacles, exact);
+    if (answer.state == LinkState::kUnknown) {
+      EXPECT_EQ(nearest.nearest.lower_bound, -std::numeric_limits<double>::infinity());
+      EXPECT_FALSE(hand.link_poses(q).known[right]);
+      return kNaN;
+    }
+    EXPECT_NEAR(nearest.nearest.distance, answer.distance, 1e-6);
+    EXPECT_NEAR(hand.link_poses(q).X_FL[right].translation().x() + answer.distance, 0.45, 1e-6);
+    return answer.distance;
+  };
+  // 0.5 - 0.05 - x, with x = 2 * 0.1 - 0.1 where it follows.
+  EXPECT_NEAR(distance({{"left", 0.1}}), 0.35, 1e-6);
+  EXPECT_NEAR(distance({{"left", 0.1}, {"right", 0.3}}), 0.15, 1e-6);
+  EXPECT_NEAR(distance({{"left", kNaN}, {"right", 0.3}}), 0.15, 1e-6);
+  EXPECT_TRUE(std::isnan(distance({{"left", 0.1}, {"right", kNaN}})));
+  EXPECT_TRUE(std::isnan(distance({{"left", kNaN}})));
+  EXPECT_NEAR(distance({{"left", 0.1}}), 0.35, 1e-6);
 }
 
 TEST(Facade, WrongArgumentsAreNamed) {

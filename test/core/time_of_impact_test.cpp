@@ -336,8 +336,9 @@ TEST(MotionBound, noPointMovesFarther) {
     Eigen::Vector3d center = test::random_vector(&rng, 0.1);
     if (i % 2 == 0) center = X_FB[body].inverse() * X_FB[arm.bodies[0]].translation();
     const double radius = i % 3 == 0 ? 0.0 : 0.1;
-    const MotionBound bound(*arm.kinematics, with_mimics(*arm.kinematics, motion.joints),
-                            motion.still, body, center, radius);
+    JointMotion placed = motion.joints;
+    place_mimics(*arm.kinematics, &placed);
+    const MotionBound bound(*arm.kinematics, placed, motion.still, body, center, radius);
     const double distance = test::uniform(&rng, 0.01, 1.0);
     const double time = std::min(bound.time_for(distance, X_FB), motion.joints.duration - start);
     for (const double share : {0.25, 0.5, 0.75, 1.0}) {

@@ -95,6 +95,24 @@ def test_unknown_positions(robot):
     assert (named.distance == robot.distances(q, obstacles).distance).all()
 
 
+def test_a_stated_mimic_joint_counts():
+    ball = '<collision><geometry><sphere radius="0.05"/></geometry></collision>'
+    slide = ('<joint name="{0}" type="prismatic"><parent link="hand"/><child link="{0}_link"/>'
+             '<axis xyz="{1}"/><limit lower="-1" upper="1" velocity="1" effort="1"/>{2}</joint>')
+    hand = ist.Robot('<robot name="hand"><link name="hand"/>'
+                     f'<link name="left_link">{ball}</link><link name="right_link">{ball}</link>'
+                     + slide.format('left', '0 1 0', '')
+                     + slide.format('right', '1 0 0', '<mimic joint="left"/>') + '</robot>')
+    obstacles = ist.Obstacles(np.array([[0.5, 0.0, 0.0]]))
+    right = hand.links.index('right_link')
+    for q, x in (({'left': 0.1}, 0.1), ({'left': 0.1, 'right': 0.3}, 0.3), ({'right': 0.2}, 0.2)):
+        assert abs(hand.distances(q, obstacles, tolerance=0.0).distance[right] - (0.45 - x)) < 1e-6
+        assert abs(hand.nearest(q, obstacles, tolerance=0.0).distance - (0.45 - x)) < 1e-6
+        assert abs(hand.link_poses(q)[right, 0, 3] - x) < 1e-12
+    unknown = hand.distances({'left': 0.1, 'right': np.nan}, obstacles)
+    assert unknown.state[right] == ist.UNKNOWN
+
+
 BOX_STL = """solid wall
 facet normal 0 0 0
 outer loop

@@ -45,7 +45,9 @@ struct BatchConfig {
 ///     for (const ist::LinkProximity& link : robot.distances(q, obstacles)) ...
 ///
 /// A configuration q is one position [rad, m] for each of joints(), NaN where it is not known: the
-/// links that it moves are UNKNOWN then. The fixed frame is the root link's.
+/// links that it moves are UNKNOWN then. Mimic joints follow; one that does not is stated by
+/// configuration(), for the calls that answer a single configuration. The fixed frame is the root
+/// link's.
 ///
 /// Immutable and thread safe; copies share everything. A call takes a query object from a pool that
 /// grows to the number of threads that ask at a time, so it may allocate and locks briefly. A
@@ -64,9 +66,10 @@ class Robot {
   const std::vector<double>& lower_limits() const;  ///< [rad, m] by joint, may be -inf
   const std::vector<double>& upper_limits() const;  ///< [rad, m] by joint, may be +inf
 
-  /// A configuration by joint names.
-  /// @param other  [rad, m] position of joints that are not named
-  /// @throws std::invalid_argument when the robot has no such joint
+  /// A configuration by joint names. Where a mimic joint is among them, positions of the mimic
+  /// joints follow those of joints(): NaN for one that is not named and follows.
+  /// @param other  [rad, m] position of joints() that are not named
+  /// @throws std::invalid_argument when the robot has no such joint, or it has no position
   std::vector<double> configuration(const std::map<std::string, double>& positions,
                                     double other = 0.0) const;
 
