@@ -8,8 +8,8 @@
 The messages of the ROS package are in ist_proximity.msg and ist_proximity.srv.
 """
 
-_NAMES = ('CLEAR', 'CONTACT', 'Distances', 'Extent', 'ModelError', 'Nearest', 'NEAR', 'Obstacles',
-          'Robot', 'UNKNOWN')
+_NAMES = ('CLEAR', 'CONTACT', 'ConstraintRows', 'Distances', 'Extent', 'FilterAnswer', 'ModelError',
+          'Nearest', 'NEAR', 'Obstacles', 'Robot', 'UNKNOWN', 'VelocityFilter', 'constraint_rows')
 
 __all__ = list(_NAMES)
 

@@ -1,6 +1,7 @@
 #include <pybind11/pybind11.h>
 
 #include "answers.h"
+#include "control_classes.h"
 #include "extent_class.h"
 #include "ist_proximity/geometry/error.h"
 #include "obstacles_class.h"
@@ -13,4 +14,5 @@ PYBIND11_MODULE(_core, module) {
   ist::python::define_extent(&module);
   ist::python::define_obstacles(&module);
   ist::python::define_robot(&module);
+  ist::python::define_control(&module);
 }

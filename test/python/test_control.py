@@ -1,0 +1,94 @@
+"""Rows and the velocity filter in Python."""
+
+import os
+import pathlib
+
+import numpy as np
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+os.environ['ROS_PACKAGE_PATH'] = str(ROOT)
+
+import ist_proximity as ist  # noqa: E402  (the environment comes first)
+
+
+@pytest.fixture(scope='module', name='robot')
+def fixture_robot():
+    return ist.Robot(str(ROOT / 'demo' / 'demo_arm.urdf'))
+
+
+@pytest.fixture(scope='module', name='obstacles')
+def fixture_obstacles():
+    rng = np.random.default_rng(46)
+    return ist.Obstacles(rng.uniform((-0.9, -0.9, 0.0), (0.9, 0.9, 1.4), (60, 3)))
+
+
+def configurations(robot, count):
+    return np.random.default_rng(3).uniform(-1.0, 1.0, (count, len(robot.joints)))
+
+
+def test_the_gradient_is_that_of_the_distance(robot, obstacles):
+    compared = 0
+    for q in configurations(robot, 20):
+        rows = ist.constraint_rows(robot, q, robot.distances(q, obstacles, tolerance=0.0))
+        assert rows.G.shape == rows.sweep.shape == (len(rows), len(robot.joints))
+        assert rows.h.shape == rows.sweep_limit.shape == rows.radius.shape == rows.link.shape
+        for k, step in enumerate(1e-5 * np.eye(len(q))):
+            after = robot.distances(q + step, obstacles, tolerance=0.0)
+            before = robot.distances(q - step, obstacles, tolerance=0.0)
+            link = rows.link
+            same = (after.state == ist.NEAR) & (after.point == before.point)
+            same &= np.linalg.norm(after.direction - before.direction, axis=1) < 2e-4
+            change = (after.distance - before.distance)[link][same[link]] / 2e-5
+            assert np.allclose(change, -rows.G[same[link], k], atol=2e-3)
+            compared += len(change)
+    assert compared > 200
+
+
+def test_the_filtered_velocity_meets_the_rows_and_the_margin(robot, obstacles):
+    limits = ist.VelocityFilter(np.full(len(robot.joints), 2.0), lower=robot.lower_limits,
+                                upper=robot.upper_limits)
+    rng = np.random.default_rng(4)
+    limited = 0
+    for q in configurations(robot, 100):
+        distances = robot.distances(q, obstacles)
+        if distances.lower_bound.min() < 0.01:
+            continue
+        rows = ist.constraint_rows(robot, q, distances, horizon=0.1)
+        answer = limits.run(rng.uniform(-2.0, 2.0, len(q)), q, rows)
+        limited += answer.status == 'limited'
+        assert (rows.G @ answer.velocity <= rows.h + 1e-7).all()
+        assert (rows.sweep @ np.abs(answer.velocity) <= rows.sweep_limit + 1e-7).all()
+        # The base cannot be moved away from what is near.
+        after = robot.distances(q + 0.1 * answer.velocity, obstacles, tolerance=0.0)
+        assert after.distance[rows.link].min() >= 0.01 - 1e-6
+    assert limited > 20
+
+
+def test_what_is_not_known_does_not_move(robot, obstacles):
+    q = np.zeros(len(robot.joints))
+    unknown = q.copy()
+    unknown[0] = np.nan
+    rows = ist.constraint_rows(robot, unknown, robot.distances(unknown, obstacles))
+    assert (rows.sweep_limit == 0.0).any()
+    answer = ist.VelocityFilter(np.ones(len(q))).run(np.full(len(q), 0.3), q, rows)
+    assert answer.velocity[0] == 0.0
+    assert 'not known' in str(answer)
+
+
+def test_wrong_values_stop_the_robot_and_wrong_settings_raise(robot, obstacles):
+    q = np.zeros(len(robot.joints))
+    distances = robot.distances(q, obstacles)
+    rows = ist.constraint_rows(robot, q, distances)
+    limits = ist.VelocityFilter(np.ones(len(q)))
+    for command in (np.full(len(q), np.nan), np.ones(len(q) + 1), []):
+        answer = limits.run(command, q, rows)
+        assert answer.status == 'fault' and not answer.velocity.any()
+        assert 'command' in str(answer)
+    assert limits.run(np.zeros(len(q)), q[:-1], rows).status == 'fault'
+    with pytest.raises(ValueError, match='horizon'):
+        ist.constraint_rows(robot, q, distances, horizon=0.0)
+    with pytest.raises(ValueError, match='joints'):
+        ist.constraint_rows(robot, q[:-1], distances)
+    with pytest.raises(ValueError, match='upper'):
+        ist.VelocityFilter([1.0], lower=[1.0], upper=[0.0])
