@@ -18,6 +18,7 @@ constexpr int kMaxIterations = 300;
 NearestVelocity::NearestVelocity(Eigen::Index joints)
     : scale_(joints),
       x_(joints),
+      speed_(joints),
       y_(joints),
       N_(joints, joints),
       Q_(joints, joints),
@@ -43,6 +44,7 @@ NearestVelocity::Outcome NearestVelocity::solve(
   active_.clear();
   count_ = 0;
   for (iterations_ = 0; iterations_ < kMaxIterations; ++iterations_) {
+    speed_ = x_.cwiseAbs();
     const Bound worst = most_violated();
     if (worst.violation <= kViolation * std::max(1.0, y_.lpNorm<Eigen::Infinity>())) {
       *x = x_;
@@ -69,11 +71,8 @@ NearestVelocity::Bound NearestVelocity::most_violated() const {
     consider(Kind::kLower, k, scale_[k] * ((*lower_)[k] - x_[k]));
   }
   for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_->count); ++i) {
-    double approach = -rows_->h[i], sweep = -rows_->sweep_limit[i];
-    for (Eigen::Index k = 0; k < x_.size(); ++k) {
-      approach += rows_->G(i, k) * x_[k];
-      sweep += rows_->sweep(i, k) * std::abs(x_[k]);
-    }
+    const double approach = rows_->G.row(i).dot(x_.transpose()) - rows_->h[i];
+    const double sweep = rows_->sweep.row(i).dot(speed_.transpose()) - rows_->sweep_limit[i];
     if (approach > 0.0) consider(Kind::kApproach, i, approach / scaled_norm(rows_->G, i));
     if (sweep > 0.0) consider(Kind::kSweep, i, sweep / scaled_norm(rows_->sweep, i));
   }

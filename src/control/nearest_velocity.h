@@ -58,8 +58,8 @@ class NearestVelocity {
   // The problem, valid during solve().
   const ConstraintRows* rows_ = nullptr;
   const Eigen::VectorXd *lower_ = nullptr, *upper_ = nullptr;
-  Eigen::VectorXd scale_;  ///< by joint: y = scale x has unit weights
-  Eigen::VectorXd x_, y_;  ///< the present velocity, and scaled
+  Eigen::VectorXd scale_;          ///< by joint: y = scale x has unit weights
+  Eigen::VectorXd x_, speed_, y_;  ///< the present velocity, its magnitudes, and scaled
 
   // Active bounds, by position: normals N = Q R of unit length and multipliers.
   std::vector<ActiveBound> active_;
