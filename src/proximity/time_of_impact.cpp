@@ -134,7 +134,7 @@ struct TimeOfImpact::Impl {
   CarriedWorlds carried;
 
   // Buffers of one call.
-  JointMotion full_motion;  // with the positions of mimic joints
+  JointMotion full_motion;   // with the positions of mimic joints
   std::vector<bool> moving;  // by link: the one that is being advanced
   JointPoses moved;
   std::vector<MotionBound> carried_bounds;  // by frame of what the robot carries
