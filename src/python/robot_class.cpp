@@ -248,10 +248,10 @@ py::object link_poses(const Robot& robot, const py::object& q) {
   const std::size_t links = robot.links().size();
   const std::size_t n =
       configurations.shape.empty() ? 1 : static_cast<std::size_t>(configurations.shape[0]);
-  const std::size_t size = n > 0 ? values.size() / n : 0;
+  const std::size_t columns = n > 0 ? values.size() / n : 0;
   std::vector<LinkPoses> poses;
   for (std::size_t k = 0; k < n; ++k) {
-    poses.push_back(robot.link_poses({values.data() + k * size, size}));
+    poses.push_back(robot.link_poses({values.data() + k * columns, columns}));
   }
   Shape shape = configurations.shape;
   for (const std::size_t size : {links, std::size_t{4}, std::size_t{4}}) {
