@@ -124,9 +124,9 @@ void add_deadline(const DeadlineCost& cost, Sentences* sentences) {
     const std::string width =
         cost.widest > 0.0 ? format_text("bounds hold but are up to %.1f mm wide", 1e3 * cost.widest)
                           : "nothing is known of them";
-    sentences->add(ProximityArray::DEGRADED, passed + links(cost.unfinished) +
-                                                 " met ~query/tolerance: " + width +
-                                                 "; raise either");
+    sentences->add(
+        ProximityArray::DEGRADED,
+        passed + links(cost.unfinished) + " met ~query/tolerance: " + width + "; raise either");
   }
   if (cost.unblended > 0) {
     sentences->add(ProximityArray::DEGRADED,
