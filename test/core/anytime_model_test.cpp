@@ -7,10 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,7 +28,6 @@ namespace {
 
 using Stage = AnytimeModel::Stage;
 constexpr double kMaxError = 0.004;  // [m]
-constexpr std::size_t kFewDozen = 48;
 constexpr int kGrowthPoints = 10;
 
 RobotModelConfig config_to(double max_error) {
@@ -116,24 +113,6 @@ void expect_certificate(const LinkModel& link, test::Rng* rng) {
   }
 }
 
-TEST(AnytimeModel, beginsWithAFewDozenSpheresAShape) {
-  const auto first = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
-  ASSERT_NE(first, nullptr);
-  test::Rng rng(71);
-  std::size_t coarse = 0;
-  for (std::size_t i = 0; i < first->robot()->links.size(); ++i) {
-    const LinkModel& link = first->robot()->links[i];
-    ASSERT_TRUE(link.usable()) << link.error;
-    EXPECT_LE(link.packing.spheres.size(),
-              kFewDozen * first->description().links[i].geometry.size());
-    EXPECT_GT(link.packing_id, 0U);
-    EXPECT_EQ(link.is_final, link.packing.certificate.reached);
-    coarse += link.is_final ? 0 : 1;
-    expect_certificate(link, &rng);
-  }
-  if (!test::kSanitized) EXPECT_GE(coarse, 6U);
-}
-
 TEST(AnytimeModel, growsLinkByLinkToTheFinalPacking) {
   const RobotModelConfig config = config_to(kMaxError);
   const auto stages = growth(AnytimeModel::build(demo(), config, Stage::kFirst));
@@ -203,29 +182,6 @@ TEST(AnytimeModel, aFineFieldTakesThePlaceOfACoarseOne) {
   EXPECT_EQ(field_of(fine->with_packings_of(*coarse)), field_of(fine));
 }
 
-// Every link takes its steps in the order of their urgency until it is complete.
-TEST(AnytimeModel, advancesByFieldsAndThenBySpheres) {
-  using LinkStep = AnytimeModel::LinkStep;
-  auto model = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
-  const auto link = static_cast<std::size_t>(next_link(*model->robot(), -1));
-  std::vector<LinkStep> steps;
-  for (;;) {
-    const LinkStep step = AnytimeModel::next_step(model->robot()->links[link]);
-    if (step == LinkStep::kNone) break;
-    steps.push_back(step);
-    model = model->advanced(link);
-  }
-  ASSERT_GE(steps.size(), 3U);
-  EXPECT_EQ(steps[0], LinkStep::kCoarseField);
-  EXPECT_EQ(steps[1], LinkStep::kFineField);
-  EXPECT_EQ(steps[2], LinkStep::kSpheres);
-  EXPECT_TRUE(std::is_sorted(steps.begin(), steps.end()));
-  EXPECT_TRUE(model->robot()->links[link].is_final);
-  LinkModel without_geometry;
-  without_geometry.error = "no geometry";
-  EXPECT_EQ(AnytimeModel::next_step(without_geometry), LinkStep::kNone);
-}
-
 TEST(AnytimeModel, fieldsOfAllLinksAreMeasuredWhereTheyAreAskedFor) {
   const std::vector<LinkGeometry> links = {test::one(Sphere{0.1}), test::one(Box{{0.1, 0.2, 0.3}})};
   RobotModelConfig config = config_to(kMaxError);
@@ -235,18 +191,6 @@ TEST(AnytimeModel, fieldsOfAllLinksAreMeasuredWhereTheyAreAskedFor) {
   }
   for (const LinkModel& link : build_robot_model(*robot_of(links), config_to(kMaxError))->links) {
     EXPECT_EQ(link.field, nullptr);
-  }
-}
-
-TEST(AnytimeModel, equalShapesGrowTogether) {
-  const std::vector<LinkGeometry> links(2, test::one(test::torus(0.1, 0.03, 24, 12)));
-  const auto first = AnytimeModel::build(robot_of(links), config_to(kMaxError), Stage::kFirst);
-  ASSERT_FALSE(first->robot()->links[0].is_final);
-  const auto next = first->refined(0);
-  for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_NE(next->robot()->links[i].packing_id, first->robot()->links[i].packing_id);
-    EXPECT_EQ(next->robot()->links[i].packing.spheres.size(),
-              next->robot()->links[0].packing.spheres.size());
   }
 }
 
@@ -285,40 +229,6 @@ TEST(AnytimeModel, tellsALimitThatWasReachedAtTheEndOnly) {
   EXPECT_FALSE(model->robot()->links[0].packing.certificate.reached);
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find("max_spheres (60)"), std::string::npos) << warnings[0];
-}
-
-// [s] that the packings of a robot took
-double packing_time(const RobotModel& robot) {
-  double time = 0.0;
-  for (const LinkModel& link : robot.links) time += link.packing_time;
-  return time;
-}
-
-// A robot answers soon only where the first stage is a small part of the packing.
-void expect_first_stage_is_small(const std::string& urdf, GeometrySource source,
-                                 const std::string& folder) {
-  const auto robot = std::make_shared<const RobotDescription>(
-      parse_urdf(urdf, source, [&](const std::string& /*package*/) { return folder; }));
-  const auto first = AnytimeModel::build(robot, config_to(kMaxError), Stage::kFirst);
-  for (const LinkModel& link : first->robot()->links) EXPECT_TRUE(link.usable()) << link.error;
-  const auto whole = AnytimeModel::build(robot, config_to(kMaxError), Stage::kFinal);
-  EXPECT_LE(packing_time(*first->robot()), 0.5 * packing_time(*whole->robot()));
-}
-
-TEST(AnytimeModel, theFirstStageIsASmallPartOfThePacking) {
-  const std::string folder = IST_PROXIMITY_SOURCE_DIR;
-  std::stringstream text;
-  text << std::ifstream(folder + "/demo/demo_arm.urdf").rdbuf();
-  expect_first_stage_is_small(text.str(), GeometrySource::kCollision, folder);
-}
-
-TEST(AnytimeModel, theFirstStageIsASmallPartOfThePackingOfThePanda) {
-  const auto data = test::data_dir();
-  if (!data) GTEST_SKIP() << test::kNoData;
-  const std::string package = test::franka_package(*data);
-  std::stringstream text;
-  text << std::ifstream(package + "/robots/panda.urdf").rdbuf();
-  expect_first_stage_is_small(text.str(), GeometrySource::kCollision, package);
 }
 
 // A link without its solid would be clear of everything.
@@ -517,29 +427,6 @@ TEST(AnytimeQuery, boundsSurviveASwapWithoutASearch) {
     }
   }
   EXPECT_GT(positive, 100);
-}
-
-// What has been measured about a link belongs to its geometry: the swap of one link's packing costs
-// the others nothing.
-TEST(AnytimeQuery, aSwapOfOneLinkLeavesTheOthersAlone) {
-  test::Rng rng(75);
-  const std::vector<LinkGeometry> links = {test::one(test::torus(0.1, 0.03, 24, 12)),
-                                           test::one(test::l_shape(0.2, 0.04))};
-  const auto first = AnytimeModel::build(robot_of(links), config_to(kMaxError), Stage::kFirst);
-  if (first->robot()->links[1].is_final) GTEST_SKIP() << "packed coarsely";
-  const auto next = first->refined(1);
-  ProximityQuery query(first->robot(), {});
-  std::vector<Eigen::Vector3d> points;
-  for (int i = 0; i < 500; ++i) points.push_back(test::random_vector(&rng, 0.5));
-  const CloudSnapshot cloud = test::make_snapshot(points);
-  std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
-  std::vector<LinkProximity> results, again;
-  query.run(X_FL, {true, true}, {&cloud}, &results);
-  query.set_model(next->robot());
-  query.run(X_FL, {true, false}, {&cloud}, &again);
-  EXPECT_EQ(query.statistics().node_pairs, 0U) << "the same question has the same answer";
-  EXPECT_EQ(query.statistics().exact_evaluations, 0U);
-  EXPECT_EQ(again[0].distance, results[0].distance);
 }
 
 // Links are there as soon as they are made, those with little work first; the last model is the

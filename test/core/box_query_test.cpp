@@ -12,7 +12,6 @@
 #include "internal/geometry/box_distance.h"
 #include "internal/geometry/solid_queries.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "support/allocations.h"
 #include "support/box_oracle.h"
 #include "support/box_truth.h"
 #include "support/meshes.h"
@@ -83,88 +82,11 @@ TEST(BoxDistance, TrianglesOfEveryKind) {
   EXPECT_GT(apart, test::scaled(1000));
 }
 
-// An oracle for cylinders: the distance to a solid cylinder is convex, so nested golden-section
-// searches over the box find its minimum.
-double minimum_over_box(const Solid& solid, const Eigen::Isometry3d& X_LO,
-                        const Eigen::AlignedBox3d& box) {
-  const auto value = [&](const Eigen::Vector3d& p) {
-    return solid.signed_distance(X_LO * p).distance;
-  };
-  const auto along = [&](auto&& self, Eigen::Vector3d p, int axis) -> double {
-    if (axis == 3) return value(p);
-    constexpr double kGolden = 0.6180339887498949;
-    double low = box.min()[axis], high = box.max()[axis];
-    const auto at = [&](double v) {
-      p[axis] = v;
-      return self(self, p, axis + 1);
-    };
-    double x1 = high - kGolden * (high - low), x2 = low + kGolden * (high - low);
-    double f1 = at(x1), f2 = at(x2);
-    for (int i = 0; i < 32; ++i) {
-      if (f1 < f2) {
-        high = x2, x2 = x1, f2 = f1;
-        f1 = at(x1 = high - kGolden * (high - low));
-      } else {
-        low = x1, x1 = x2, f1 = f2;
-        f2 = at(x2 = low + kGolden * (high - low));
-      }
-    }
-    return std::min({f1, f2, at(box.min()[axis]), at(box.max()[axis])});
-  };
-  return along(along, box.center(), 0);
-}
-
-TEST(BoxDistance, Primitives) {
-  test::Rng rng(32);
-  for (int i = 0; i < test::scaled(60); ++i) {
-    const Eigen::Isometry3d X_OL = test::random_pose(&rng, i % 4 == 0 ? 0.05 : 0.4);
-    const Eigen::Vector3d half(test::uniform(&rng, 0.01, 0.2), test::uniform(&rng, 0.01, 0.2),
-                               test::uniform(&rng, 0.01, 0.2));
-    const Eigen::AlignedBox3d box(-half, half);
-    for (const Shape& shape :
-         {Shape(Sphere{0.1}), Shape(Cylinder{0.05, 0.2}), Shape(Box{{0.2, 0.1, 0.05}})}) {
-      const Solid solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}});
-      const BoxDistance found = distance_to_box(solid, box, X_OL, kInfinity);
-      const double truth = minimum_over_box(solid, X_OL.inverse(), box);
-      if (truth > 1e-6) {
-        ASSERT_NEAR(found.distance, truth, 2e-6) << i << " shape " << shape.index();
-        ASSERT_LE(found.lower_bound, truth + 1e-9);
-        ASSERT_GE(found.lower_bound, found.distance - 1e-7);
-      } else if (truth < -1e-6 && shape.index() != 0) {
-        ASSERT_EQ(found.distance, 0.0);
-      }
-      ASSERT_LT(box.exteriorDistance(found.p_OB), 1e-12);
-      ASSERT_LT(solid.signed_distance(X_OL.inverse() * found.p_OS).distance, 1e-9);
-    }
-  }
-}
-
 std::vector<Eigen::AlignedBox3d> random_leaves(test::Rng* rng, int count, double space,
                                                double resolution, int levels) {
   std::vector<Eigen::AlignedBox3d> boxes(static_cast<std::size_t>(count));
   for (Eigen::AlignedBox3d& box : boxes) box = test::random_leaf(rng, space, resolution, levels);
   return boxes;
-}
-
-TEST(BoxIndex, HoldsEveryBoxOnce) {
-  test::Rng rng(33);
-  for (const int count : {0, 1, 16, 17, 257, 5000}) {
-    const std::vector<Eigen::AlignedBox3d> boxes = random_leaves(&rng, count, 20.0, 0.05, 6);
-    BoxIndex index;
-    index.build(boxes);
-    EXPECT_EQ(index.size(), boxes.size());
-    EXPECT_EQ(index.empty(), boxes.empty());
-    std::vector<int> seen(boxes.size(), 0);
-    for (const BoxTile& tile : index.bvh().tiles()) {
-      for (int k = 0; k < tile.count; ++k) {
-        ++seen[tile.id[k]];
-        const Eigen::AlignedBox3d box = tile.box(k);
-        ASSERT_LT((box.min() + index.origin() - boxes[tile.id[k]].min()).norm(), 1e-5);
-        ASSERT_LT((box.max() + index.origin() - boxes[tile.id[k]].max()).norm(), 1e-5);
-      }
-    }
-    EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), count);
-  }
 }
 
 std::vector<TriangleMesh> link_meshes() {
@@ -187,7 +109,6 @@ TEST_P(Boxes, AgainstOracle) {
   std::vector<LinkProximity> results;
   std::vector<Eigen::Isometry3d> X_FL(meshes.size());
   int clear = 0, near = 0, contact = 0, cases = 0;
-  double widest = 0.0;
   const int scenes = test::scaled(tolerance == 0.0 ? 500 : 100);
   for (int scene = 0; scene < scenes; ++scene) {
     const std::vector<Eigen::AlignedBox3d> boxes =
@@ -209,7 +130,6 @@ TEST_P(Boxes, AgainstOracle) {
         near += result.state == LinkState::kNear;
         if (result.state != LinkState::kContact) continue;
         ++contact;
-        widest = std::max(widest, result.distance - result.lower_bound);
         if (cases % 10 == 0) {
           ASSERT_LE(result.lower_bound, sampled_depth(&rng, meshes[i], map, X_FL[i], 200));
         }
@@ -219,9 +139,6 @@ TEST_P(Boxes, AgainstOracle) {
   EXPECT_GT(clear, scenes / 10);
   EXPECT_GT(near, scenes);
   EXPECT_GT(contact, test::kSanitized ? -1 : scenes / 10);
-  RecordProperty("cases", cases);
-  std::printf("%d cases: %d clear, %d near, %d contact, widest depth interval %.2f mm\n", cases,
-              clear, near, contact, 1e3 * widest);
 }
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, Boxes, ::testing::Values(0.0, 0.001, 0.02));
@@ -313,7 +230,6 @@ TEST(Boxes, TouchAndAlignment) {
   }
 }
 
-// A box that holds the whole link, and one wholly inside it, touch no triangle or all of them.
 // How deep two boxes overlap: the least over the axes along which they can be parted (Gottschalk
 // 1996). Box B is axis-aligned about the origin.
 struct Overlap {
@@ -378,13 +294,12 @@ TEST(Boxes, SmallOverlapsAreContact) {
     ++near;
     if (depth > 5e-6) ++near_and_deep;
   }
-  std::printf("%d in contact, %d NEAR, of which %d overlap by more than 5 um\n", contact, near,
-              near_and_deep);
   EXPECT_GT(contact, test::scaled(2000));
   EXPECT_EQ(near_and_deep, 0);
   EXPECT_LE(near, test::scaled(6));
 }
 
+// A box that holds the whole link, and one wholly inside it, touch no triangle or all of them.
 TEST(Boxes, OneInsideTheOther) {
   const TriangleMesh mesh = test::icosphere(0.1, 2);
   const auto model = test::make_model({Shape(mesh)}, 0.005);
@@ -458,28 +373,6 @@ TEST(Boxes, PointInsideIsFoundWhereAnotherObstacleTouches) {
   EXPECT_EQ(robot.nearest.state, LinkState::kContact);
 }
 
-TEST(Boxes, QueriesAllocateNothing) {
-  test::Rng rng(37);
-  const std::vector<LinkGeometry> links = test::random_links(&rng);
-  const auto model = test::model_of(links, 0.01);
-  const CloudSnapshot map = test::make_map(random_leaves(&rng, 3000, 1.0, 0.01, 4));
-  const CloudSnapshot cloud = test::make_snapshot({{0.1, 0, 0}, {0, 0.4, 0}});
-  const std::vector<const CloudSnapshot*> obstacles = {&map, &cloud};
-  ProximityQuery query(model, {});
-  const std::vector<bool> known(links.size(), true);
-  std::vector<LinkProximity> results(links.size());
-  std::vector<Eigen::Isometry3d> X_FL(links.size());
-  int contacts = 0;
-  for (int i = 0; i < 30; ++i) {
-    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 1.5);
-    const long before = test::allocations;
-    query.run(X_FL, known, obstacles, &results);
-    ASSERT_EQ(test::allocations - before, 0);
-    for (const LinkProximity& result : results) contacts += result.state == LinkState::kContact;
-  }
-  EXPECT_GT(contacts, 10);
-}
-
 TEST(Boxes, BoundsHoldWheneverTheDeadlinePasses) {
   test::Rng rng(36);
   const std::vector<TriangleMesh> meshes = link_meshes();
@@ -506,70 +399,6 @@ TEST(Boxes, BoundsHoldWheneverTheDeadlinePasses) {
     }
   }
   EXPECT_GT(unfinished, test::scaled(20));
-}
-
-struct Work {
-  std::uint64_t kept_evaluations = 0, evaluations = 0;
-};
-
-// Links move in small steps among thousands of boxes, as memory remembers them; every tenth step
-// the index is built again, with some boxes gone. The answers agree with those of fresh queries.
-// @returns the work of both
-Work move_among_boxes(double max_error) {
-  test::Rng rng(35);
-  std::vector<Eigen::AlignedBox3d> all;
-  while (all.size() < 2500) {
-    const Eigen::Vector3d p = test::random_vector(&rng, 1.0);
-    if (p.norm() < 0.5 || p.norm() > 0.6) continue;
-    const Eigen::Vector3d low = (50.0 * p).array().floor() / 50.0;
-    all.emplace_back(low, low + Eigen::Vector3d::Constant(0.02));
-  }
-  const std::vector<TriangleMesh> meshes = {test::torus(0.2, 0.03, 24, 12),
-                                            test::icosphere(0.2, 3)};
-  const auto model = test::make_model({meshes.begin(), meshes.end()}, max_error);
-  const QueryConfig config;
-  ProximityQuery query(model, config);
-  const std::vector<bool> known(meshes.size(), true);
-  std::vector<LinkProximity> results, anew;
-  CloudSnapshot map;
-  Work work;
-  for (int step = 0; step < 120; ++step) {
-    if (step % 10 == 0) {
-      std::vector<Eigen::AlignedBox3d> boxes;
-      for (const Eigen::AlignedBox3d& box : all) {
-        if (test::uniform(&rng, 0.0, 1.0) < 0.95) boxes.push_back(box);
-      }
-      auto index = std::make_shared<BoxIndex>();
-      index->build(boxes);
-      map.boxes = index;
-    }
-    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-    const double angle = 0.002 * step;
-    X.translation() = 0.05 * Eigen::Vector3d(std::sin(angle), std::cos(angle), angle);
-    X.rotate(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX()));
-    const std::vector<Eigen::Isometry3d> X_FL(meshes.size(), X);
-    query.run(X_FL, known, {&map}, &results);
-    ProximityQuery fresh(model, config);
-    fresh.run(X_FL, known, {&map}, &anew);
-    work.kept_evaluations += query.statistics().exact_evaluations;
-    work.evaluations += fresh.statistics().exact_evaluations;
-    for (std::size_t i = 0; i < meshes.size(); ++i) {
-      // The fresh query's bounds are those of the oracle's tests.
-      EXPECT_LE(results[i].lower_bound, anew[i].distance + 1e-9) << step;
-      EXPECT_GE(results[i].distance, anew[i].lower_bound - 1e-9) << step;
-      EXPECT_LE(results[i].distance - results[i].lower_bound, config.tolerance + 2e-6) << step;
-      if (step != 119) continue;
-      expect_truth(results[i], truth_of(meshes[i], map, X), meshes[i], map, X, config);
-    }
-  }
-  return work;
-}
-
-// Coarse spheres: boxes that only exact distances tell apart are measured once for several steps.
-// Without bounds that are kept of each box, more than 98 % as many as afresh are measured.
-TEST(BoxesKept, AreMeasuredOnceForSeveralSteps) {
-  const Work work = move_among_boxes(0.005);
-  EXPECT_LT(20 * work.kept_evaluations, 19 * work.evaluations);
 }
 
 }  // namespace

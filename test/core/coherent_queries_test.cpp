@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include "internal/proximity/deadline.h"
@@ -50,12 +49,9 @@ class CoherentQueriesTest : public ::testing::Test {
     queries->warm_up(X_FL_, {true, true}, {&cloud_}, {}, {}, limit);
   }
 
-  // @returns the pairs and points that it took
-  std::uint64_t run(CoherentQueries* queries) {
+  void run(CoherentQueries* queries) {
     queries->query().set_config({});
     queries->query().run(X_FL_, {true, true}, {&cloud_}, &results_);
-    const QueryStatistics& count = queries->query().statistics();
-    return count.node_pairs + count.leaf_pairs + count.exact_evaluations;
   }
 
   void expect_true_answers() {
@@ -80,28 +76,6 @@ class CoherentQueriesTest : public ::testing::Test {
   CloudSnapshot cloud_;
   std::vector<LinkProximity> results_;
 };
-
-TEST_F(CoherentQueriesTest, GoOnFromTheFirstAnswerOfAnotherThread) {
-  std::uint64_t cold = 0, warm = 0;
-  auto own = std::make_unique<CoherentQueries>(model_, QueryConfig());
-  auto spare = std::make_unique<CoherentQueries>(model_, QueryConfig());
-  CoherentQueries alone(model_, QueryConfig());
-  for (int image = 0; image < 20; ++image) {
-    see();
-    warm_up(spare.get());
-    std::swap(own, spare);
-    for (int step = 0; step < 3; ++step) {
-      move();
-      const std::uint64_t by_alone = run(&alone), by_own = run(own.get());
-      expect_true_answers();
-      if (step > 0) continue;
-      cold += by_alone;
-      warm += by_own;
-    }
-  }
-  EXPECT_GT(warm, 0U);
-  EXPECT_LT(2 * warm, cold);
-}
 
 TEST_F(CoherentQueriesTest, RepelFromTheNewCloud) {
   CoherentQueries queries(model_, QueryConfig());

@@ -17,8 +17,6 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/errors.h"
-#include "support/meshes.h"
-#include "support/oracle.h"
 #include "support/scene.h"
 #include "support/tiles.h"
 #include "support/whole_cloud.h"
@@ -179,51 +177,6 @@ TEST(DepthImage, PointsAreThoseOfTheCloud) {
           EXPECT_LT((ours_by_id.at(id) - p).norm(), 2e-7) << id;
         }
       }
-    }
-  }
-}
-
-// Distances are those of the cloud, and the bound is below the truth from the points in double.
-TEST(DepthImage, DistancesAreThoseOfTheCloud) {
-  test::Rng rng(6);
-  const std::vector<TriangleMesh> meshes = {test::l_shape(0.2, 0.05), test::icosphere(0.08, 2)};
-  const auto model = test::make_model({meshes[0], meshes[1]}, 0.005);
-  QueryConfig query_config;
-  query_config.max_distance = 5.0;
-  query_config.tolerance = 0.0;
-  for (int i = 0; i < 12; ++i) {
-    const Format& format = kFormats[static_cast<std::size_t>(i) % kFormats.size()];
-    CameraModel camera = camera_of(96, 80);
-    if (i % 2 == 1) {  // a second stereo camera, 7 and 4 cm off the optical frame
-      camera.P[3] = -0.07 * camera.P[0];
-      camera.P[7] = 0.04 * camera.P[5];
-    }
-    const std::vector<double> depths = scene_depths(96, 80, &rng);
-    const Message message(depths, 96, camera, format);
-    const PeerCloud peer(depths, 96, camera, format);
-    const Eigen::Isometry3d X_FS = test::random_pose(&rng, 0.5);
-    std::vector<Eigen::Isometry3d> X_FL;
-    for (std::size_t k = 0; k < meshes.size(); ++k) {
-      Eigen::Isometry3d X_SL = test::random_pose(&rng, 0.25);
-      X_SL.pretranslate(Eigen::Vector3d(0.0, 0.0, 0.4));
-      X_FL.push_back(X_FS * X_SL);
-    }
-    CloudSnapshot ours, theirs;
-    Ingest ingest(test::whole_cloud(false));
-    ingest.run(message.raw, X_FS, {}, 0.0, &ours);
-    ingest.run(peer.raw, X_FS, {}, 0.0, &theirs);
-    std::vector<LinkProximity> of_image, of_cloud;
-    ASSERT_TRUE(ProximityQuery(model, query_config).run(X_FL, {true, true}, {&ours}, &of_image));
-    ASSERT_TRUE(ProximityQuery(model, query_config).run(X_FL, {true, true}, {&theirs}, &of_cloud));
-    for (std::size_t k = 0; k < meshes.size(); ++k) {
-      EXPECT_NEAR(of_image[k].distance, of_cloud[k].distance, 1e-6) << "scene " << i;
-      std::vector<Eigen::Vector3d> points_L;
-      for (const Eigen::Vector3d& p : peer.points) {
-        if (p.allFinite()) points_L.push_back(X_FL[k].inverse() * X_FS * p);
-      }
-      const double truth = test::oracle_minimum(meshes[k], points_L);
-      EXPECT_LE(of_image[k].lower_bound, truth + 1e-9) << "scene " << i << ", link " << k;
-      EXPECT_NEAR(of_image[k].distance, truth, 2e-6) << "scene " << i << ", link " << k;
     }
   }
 }

@@ -1,21 +1,22 @@
 // Distance fields: what their nodes and balls promise, against the exact geometry and brute force.
 
-#include "internal/geometry/distance_field.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <variant>
 #include <vector>
 
 #include "internal/geometry/cancelled.h"
+#include "internal/geometry/distance_field.h"
+#include "support/distance_fields.h"
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/shape_oracle.h"
+#include "support/trial.h"
 
 namespace ist {
 namespace {
@@ -144,68 +145,6 @@ TEST(DistanceField, NoNodeInsideIsTakenForOutside) {
   EXPECT_GT(inside, 20000);
 }
 
-// The surface points of the grid of depths are of the surface, and hardly farther than it is; its
-// balls hold nothing that is inside.
-TEST(DistanceField, DepthsAreFromTheSurface) {
-  test::Rng rng(6);
-  int fields = 0, balls = 0, inside = 0;
-  for (const auto& [solid, link, field] : fields_of_random_links(&rng)) {
-    ASSERT_EQ(field.has_depths(), link.size() == 1);
-    if (!field.has_depths()) continue;
-    ++fields;
-    const DistanceField::Level& grid = field.depths();
-    ASSERT_EQ(field.surface_xy().size(), nodes_of(grid));
-    const auto unsigned_distance = [&](const Eigen::Vector3d& p) {
-      const auto* mesh = std::get_if<TriangleMesh>(&link[0].shape);
-      return mesh != nullptr ? test::oracle_distance(*mesh, p)
-                             : std::abs(test::oracle_signed_distance(link, p));
-    };
-    const double slack = 2e-6 + static_cast<double>(field.surface_step());
-    for (int k = 0; k < 200; ++k) {
-      const auto i = static_cast<std::size_t>(
-          test::uniform(&rng, 0.0, static_cast<double>(nodes_of(grid)) - 0.5));
-      const std::uint32_t xy = field.surface_xy()[i], z_ball = field.surface_z_ball()[i];
-      const auto part = [&](std::uint32_t half) {
-        return static_cast<std::int16_t>(half & 0xFFFFU) *
-               static_cast<double>(field.surface_step());
-      };
-      const Eigen::Vector3d to_surface(part(xy), part(xy >> 16U), part(z_ball));
-      const Eigen::Vector3d p = node(grid, i);
-      ASSERT_LE(unsigned_distance(p + to_surface), slack);
-      const double truth = unsigned_distance(p);
-      ASSERT_LE(to_surface.norm(),
-                truth + static_cast<double>(grid.cell / DistanceField::kSlackParts) + slack);
-      inside += solid.is_inside(p) ? 1 : 0;
-      const double radius = (z_ball >> 16U) * static_cast<double>(DistanceField::kBallStep);
-      ASSERT_LE(radius, truth + 1e-9);
-      if (radius == 0.0) continue;
-      ++balls;
-      ASSERT_FALSE(solid.is_inside(p + test::uniform(&rng, 0.0, radius) *
-                                           test::random_vector(&rng, 1.0).normalized()));
-    }
-  }
-  EXPECT_GT(fields, 10);
-  EXPECT_GT(balls, 500);
-  EXPECT_GT(inside, 500);
-}
-
-TEST(DistanceField, GridsLieWithinEachOtherAndReachFar) {
-  const Solid solid({GeometryElement{Box{{0.3, 0.1, 0.2}}, Eigen::Isometry3d::Identity(), "box"}});
-  const auto box_of = [](const DistanceField::Level& level) {
-    return Eigen::AlignedBox3d(node(level, 0), node(level, nodes_of(level) - 1));
-  };
-  for (const auto detail : kDetails) {
-    const DistanceField field(solid, detail);
-    ASSERT_GE(field.levels().size(), 3U);
-    for (std::size_t l = 1; l < field.levels().size(); ++l) {
-      EXPECT_TRUE(box_of(field.levels()[l]).contains(box_of(field.levels()[l - 1])));
-      EXPECT_GT(field.levels()[l].cell, field.levels()[l - 1].cell);
-    }
-    EXPECT_TRUE(box_of(field.levels().front()).contains(field.bounds().cast<double>()));
-    EXPECT_TRUE(box_of(field.levels().back()).contains(Eigen::Vector3d(1.2, 1.2, 1.2)));
-  }
-}
-
 // About a large link cells are larger, so that memory is bounded.
 TEST(DistanceField, MemoryIsBounded) {
   for (const double size : {1e-4, 0.3, 3.0, 300.0, 9000.0}) {
@@ -219,12 +158,95 @@ TEST(DistanceField, MemoryIsBounded) {
   }
 }
 
-TEST(DistanceField, NothingHasAnEmptyField) { EXPECT_TRUE(DistanceField(Solid()).empty()); }
-
 TEST(DistanceField, CanBeCancelled) {
   const Solid solid({GeometryElement{Sphere{0.1}, Eigen::Isometry3d::Identity(), "sphere"}});
   for (const auto detail : kDetails) {
     EXPECT_THROW(DistanceField(solid, detail, [] { return true; }), Cancelled);
+  }
+}
+
+// Contact found by a distance field where links are large, of several elements, or nowhere.
+
+// A box of points may be kilometres deep.
+TEST(FieldContact, ALargeLinkHasDeepPoints) {
+  constexpr double kSize = 5000.0;
+  test::Rng rng(1);
+  for (const TriangleMesh& mesh :
+       {test::box({kSize, kSize, kSize}), test::open_box({kSize, kSize, kSize})}) {
+    const LinkGeometry link = test::one(mesh);
+    const auto model = test::with_fields(test::model_of({link}, 100.0));
+    for (int round = 0; round < 10; ++round) {
+      std::vector<Eigen::Vector3d> points;
+      for (int k = 0; k < 300; ++k) points.push_back(test::random_vector(&rng, 0.499 * kSize));
+      const CloudSnapshot cloud = test::make_snapshot(points);
+      const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+      ProximityQuery query(model, {});
+      LinkProximity result;
+      ASSERT_TRUE(query.run_link(0, X_FL, {&cloud}, &result));
+      EXPECT_LT(result.distance, -1000.0);
+      test::expect_truth(result, test::truth_of(link, X_FL, points, cloud), query.config(), X_FL,
+                         1e-6 * kSize, kSize);
+      if (HasFailure()) return;
+    }
+  }
+}
+
+// Another link in contact is no reason for a wide interval.
+TEST(FieldContact, TheMinimumOfSeveralElementsIsAsExactAsAsked) {
+  Eigen::Isometry3d X_LE = Eigen::Isometry3d::Identity();
+  X_LE.translation().x() = 0.1;
+  const LinkGeometry two = {
+      GeometryElement{test::open_box({0.1, 0.1, 0.1}), Eigen::Isometry3d::Identity(), "open box"},
+      GeometryElement{test::box({0.1, 0.05, 0.05}), X_LE, "box"}};
+  const auto model =
+      test::with_fields(test::model_of({test::one(Box{{0.1, 0.1, 0.1}}), two}, 0.02));
+  QueryConfig config;
+  config.tolerance = 0.0;
+  test::Rng rng(1);
+  int contacts = 0;
+  for (int round = 0; round < 200; ++round) {
+    std::vector<Eigen::Vector3d> points;
+    for (int k = 0; k < 30; ++k) points.push_back(test::random_vector(&rng, 0.15));
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
+    X_FL[1].translation() = test::random_vector(&rng, 0.15);
+    ProximityQuery query(model, config);
+    RobotProximity result;
+    ASSERT_TRUE(query.run_minimum(X_FL, {true, true}, {&cloud}, &result));
+    if (result.nearest.state != LinkState::kContact) continue;
+    ++contacts;
+    ASSERT_LT(result.nearest.distance - result.nearest.lower_bound, 1e-6) << round;
+  }
+  EXPECT_GT(contacts, 100);
+}
+
+// What is asked for a pose that is not finite is not known, with a field and without.
+TEST(FieldContact, APoseThatIsNotFiniteIsUnknown) {
+  const std::vector<LinkGeometry> links = {test::one(test::box({0.1, 0.1, 0.1})),
+                                           test::one(test::open_box({0.1, 0.1, 0.1}))};
+  test::Rng rng(1);
+  std::vector<Eigen::Vector3d> points;
+  for (int k = 0; k < 300; ++k) points.push_back(test::random_vector(&rng, 0.2));
+  const CloudSnapshot cloud = test::make_snapshot(points);
+  for (const auto& model :
+       {test::model_of(links, 0.01), test::with_fields(test::model_of(links, 0.01))}) {
+    ProximityQuery query(model, {});
+    std::vector<LinkProximity> results;
+    RobotProximity minimum;
+    for (const double bad :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      for (int at = 0; at < 12; ++at) {
+        std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
+        X_FL[0].matrix()(at / 4, at % 4) = bad;
+        query.run(X_FL, {true, true}, {&cloud}, &results);
+        EXPECT_EQ(results[0].state, LinkState::kUnknown) << bad << " at " << at;
+        EXPECT_EQ(results[1].state, LinkState::kContact) << bad << " at " << at;
+        query.run_minimum(X_FL, {true, true}, {&cloud}, &minimum);
+        EXPECT_FALSE(minimum.all_known);
+        query.run_link(0, X_FL[0], {&cloud}, &results[0]);
+        EXPECT_EQ(results[0].state, LinkState::kUnknown) << bad << " at " << at;
+      }
+    }
   }
 }
 

@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
+#include "support/distance_fields.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/sanitizers.h"
@@ -33,18 +36,24 @@ Point opening(const TriangleMesh& mesh) {
   return Point::Zero();
 }
 
+// The mesh as a link, without a distance field and with one.
+std::array<std::shared_ptr<const RobotModel>, 2> models_of(const TriangleMesh& mesh) {
+  const auto without = test::make_model({mesh}, 0.005);
+  return {without, test::with_fields(without)};
+}
+
 TEST(HoleCoherence, PointsGoInThroughTheOpening) {
   test::Rng rng(81);
   const TriangleMesh mesh = test::open_box({0.2, 0.2, 0.2});
   const Point out = opening(mesh);
   ASSERT_EQ(out.norm(), 1.0) << "a box that is open on one side";
-  const auto model = test::make_model({mesh}, 0.005);
+  const auto models = models_of(mesh);
   std::vector<LinkProximity> results;
   int contacts = 0, jumps = 0;
   for (int run = 0; run < test::scaled(300); ++run) {
     QueryConfig config;
     config.tolerance = run % 3 == 0 ? 0.0 : std::pow(10.0, test::uniform(&rng, -4, -1.5));
-    ProximityQuery query(model, config);
+    ProximityQuery query(models[static_cast<std::size_t>(run % 2)], config);
     Point lateral = test::random_vector(&rng, 0.05);
     lateral -= lateral.dot(out) * out;
     const CloudSnapshot cloud = test::make_snapshot({Point::Zero()});
@@ -93,8 +102,8 @@ TEST(HoleCoherence, APointInTheOpeningIsDeeperThanThoseBelowTheFrame) {
   test::Rng rng(82);
   const Point out = opening(test::open_box({0.2, 0.2, 0.2}));
   const TriangleMesh mesh = framed_box(out);
-  const auto model = test::make_model({mesh}, 0.005);
-  ASSERT_FALSE(model->links[0].solid.is_closed());
+  const auto models = models_of(mesh);
+  ASSERT_FALSE(models[0]->links[0].solid.is_closed());
   std::vector<LinkProximity> results;
   int jumps = 0;
   for (int run = 0; run < test::scaled(200); ++run) {
@@ -110,7 +119,7 @@ TEST(HoleCoherence, APointInTheOpeningIsDeeperThanThoseBelowTheFrame) {
     const CloudSnapshot cloud = test::make_snapshot(points);
     QueryConfig config;
     config.tolerance = run % 2 == 0 ? 0.0 : 0.001;
-    ProximityQuery query(model, config);
+    ProximityQuery query(models[static_cast<std::size_t>(run / 2 % 2)], config);
     const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
     ASSERT_TRUE(query.run({X_FL}, {true}, {&below}, &results));
     ASSERT_EQ(results[0].state, LinkState::kContact);
@@ -130,14 +139,14 @@ TEST(HoleCoherence, ASecondPointGoesInUnnoticedByTheWarmStart) {
   test::Rng rng(82);
   const TriangleMesh mesh = test::open_box({0.2, 0.2, 0.2});
   const Point out = opening(mesh);
-  const auto model = test::make_model({mesh}, 0.005);
+  const auto models = models_of(mesh);
   const Point side = out.unitOrthogonal();
   std::vector<LinkProximity> results;
   int contacts = 0;
   for (int run = 0; run < test::scaled(100); ++run) {
     QueryConfig config;
     config.tolerance = run % 2 == 0 ? 0.0 : 0.001;
-    ProximityQuery query(model, config);
+    ProximityQuery query(models[static_cast<std::size_t>(run / 2 % 2)], config);
     const Point through = (0.1 + test::uniform(&rng, 0.02, 0.05)) * out;
     const Point above_rim = 0.1 * side + (0.1 + test::uniform(&rng, 0.08, 0.09)) * out;
     const CloudSnapshot cloud = test::make_snapshot({through, above_rim});
@@ -167,7 +176,7 @@ TEST(HoleCoherence, APointThatOnlyTheFrontHoldsGoesInThroughTheOpening) {
   test::Rng rng(83);
   const TriangleMesh mesh = test::open_box({0.2, 0.2, 0.2});
   const Point out = opening(mesh);
-  const auto model = test::make_model({mesh}, 0.005);
+  const auto models = models_of(mesh);
   const Point side = out.unitOrthogonal();
   std::vector<LinkProximity> results;
   int contacts = 0;
@@ -175,7 +184,7 @@ TEST(HoleCoherence, APointThatOnlyTheFrontHoldsGoesInThroughTheOpening) {
     QueryConfig config;
     config.max_distance = 1.0;
     config.tolerance = run % 2 == 0 ? 0.0 : 0.001;
-    ProximityQuery query(model, config);
+    ProximityQuery query(models[static_cast<std::size_t>(run / 2 % 2)], config);
     const double height = test::uniform(&rng, 0.07, 0.08);  // [m] above the opening
     std::vector<Point> points(32);
     for (Point& p : points) p = 0.21 * side + test::random_vector(&rng, 0.002);

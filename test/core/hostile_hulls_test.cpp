@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "internal/geometry/hull_distance.h"
 #include "internal/geometry/surface_bvh.h"
 #include "ist_proximity/geometry/solid.h"
 #include "proximity/surface_pair_search.h"
@@ -143,6 +144,72 @@ TEST(HostileHulls, BoundsHold) {
   EXPECT_GT(apart, 20 * pairs / 2);
   EXPECT_GT(touching, 20 * pairs / 50);
   EXPECT_GT(near, 20 * pairs / 20);
+}
+
+// Coresets of convex hulls, and lower bounds of the distance of surfaces by them.
+
+using Point = Eigen::Vector3d;
+
+std::vector<ConvexPart> parts_of(const TriangleMesh& mesh) {
+  std::vector<ConvexPart> parts(mesh.triangles.size());
+  for (std::size_t t = 0; t < parts.size(); ++t) {
+    parts[t].a = mesh.corner(t, 0);
+    parts[t].b = mesh.corner(t, 1);
+    parts[t].c = mesh.corner(t, 2);
+  }
+  return parts;
+}
+
+// All corners at random on a line, in a plane, at one point, or in space.
+TriangleMesh degenerate(test::Rng* rng, int dimensions) {
+  TriangleMesh mesh = test::random_soup(rng, 20);
+  for (Point& v : mesh.vertices) {
+    for (int axis = dimensions; axis < 3; ++axis) v[axis] = 0.05;
+  }
+  return mesh;
+}
+
+std::vector<TriangleMesh> meshes(test::Rng* rng) {
+  return {test::box({0.1, 0.2, 0.3}), test::icosphere(0.1, 4),    test::torus(0.08, 0.02, 96, 48),
+          test::random_lump(rng),     test::random_soup(rng, 30), degenerate(rng, 0),
+          degenerate(rng, 1),         degenerate(rng, 2)};
+}
+
+// Never above the distance of any two triangles, from any start; and for convex meshes that
+// distance.
+TEST(HullDistance, IsALowerBoundAndTightForConvexMeshes) {
+  test::Rng rng(32);
+  const std::vector<TriangleMesh> all = meshes(&rng);
+  constexpr std::size_t kConvex = 2;  // the first ones
+  int apart = 0, tight = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      const HullCoreset a(parts_of(all[i])), b(parts_of(all[k]));
+      const test::TriangleGroups groups_a(test::triangles_of(test::one(all[i])));
+      const test::TriangleGroups groups_b(test::triangles_of(test::one(all[k])));
+      HullSupport support;
+      for (int n = 0; n < test::scaled(30); ++n) {
+        Eigen::Isometry3d X_BA = test::random_pose(&rng, 0.3);
+        if (n % 5 == 0) X_BA.linear().setIdentity();  // parallel faces and edges
+        if (n % 7 == 0) X_BA.translation().setZero();
+        const double truth = groups_b.distance(groups_a, X_BA);
+        if (n % 3 == 0) support = {};
+        const HullDistance found = hull_distance(a, b, X_BA, 1e-9, &support);
+        ASSERT_LE(found.lower_bound, truth + 1e-14) << i << " " << k;
+        if (!(found.lower_bound > 0.0)) continue;
+        ++apart;
+        EXPECT_NEAR(found.direction.norm(), 1.0, 1e-12);
+        const double width = (found.on_a - found.on_b).norm();
+        ASSERT_GE(width, found.lower_bound - 1e-14);
+        if (i >= kConvex || k >= kConvex) continue;
+        EXPECT_NEAR(width, truth, a.error() + b.error() + 1e-8);
+        EXPECT_NEAR(found.lower_bound, truth, 2.0 * (a.error() + b.error()) + 1e-8);
+        ++tight;
+      }
+    }
+  }
+  EXPECT_GT(apart, test::scaled(500));
+  EXPECT_GT(tight, test::scaled(30));
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/broken_promise.h"
+#include "support/distance_fields.h"
 #include "support/random_links.h"
 #include "support/random_numbers.h"
 #include "support/sanitizers.h"
@@ -35,7 +36,8 @@ std::vector<Robot> robots(test::Rng* rng) {
   std::vector<Robot> robots;
   for (const LinkGeometry& link : links) robots.push_back({link, {}});
   for (const double max_error : {0.05, 0.01}) {
-    const auto all = test::model_of(links, max_error);
+    std::shared_ptr<const RobotModel> all = test::model_of(links, max_error);
+    if (max_error == 0.01) all = test::with_fields(all, 2);
     for (std::size_t i = 0; i < links.size(); ++i) {
       auto alone = std::make_shared<RobotModel>();
       alone->links = {all->links[i]};

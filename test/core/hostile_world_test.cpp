@@ -389,47 +389,5 @@ TEST(HostileWorld, ObjectsOfEqualGeometryShareIt) {
   EXPECT_TRUE(other.contains("good"));
 }
 
-// Every object was looked at in every run: 10 ms for 10^5 boxes, of which 20 moved. Objects of
-// frames that stand still cost nothing, as do those that are far, and those that move are measured
-// where they are.
-TEST(HostileWorld, OnlyObjectsThatMoveOrAreNearArePlaced) {
-  WorldBuilder builder;
-  std::vector<WorldObject> objects;
-  for (int i = 0; i < 3000; ++i) {
-    WorldObject object;
-    object.name = "object " + std::to_string(i);
-    object.frame = i % 300 == 0 ? "frame " + std::to_string(i / 300) : "cell";
-    object.geometry = {GeometryElement{Box{{0.1, 0.1, 0.1}}, Eigen::Isometry3d::Identity(), "box"}};
-    object.X_BO.translation() = Eigen::Vector3d(2.0 + 0.2 * (i % 60), 0.2 * (i / 60), 0.0);
-    objects.push_back(object);
-  }
-  ASSERT_TRUE(builder.add(objects).empty());
-  PosedWorld nothing, posed{builder.world(), {}};
-  nothing.X_FB.resize(3, Eigen::Isometry3d::Identity());  // of no world, so they are not read
-  const std::vector<std::string>& frames = posed.world->frames();
-  posed.X_FB.assign(frames.size(), Eigen::Isometry3d::Identity());
-  WorldQuery query(make_robot_surfaces(test::make_model({Box{{0.1, 0.1, 0.1}}}, 0.005)));
-  const std::vector<Eigen::Isometry3d> X_FL = {Eigen::Isometry3d::Identity()};
-  std::vector<LinkProximity> results;
-  const auto run = [&] {
-    ASSERT_TRUE(query.run(X_FL, {true}, {&nothing, &posed}, TimePoint::max(), &results));
-  };
-  run();
-  EXPECT_EQ(query.statistics().objects_placed, 0U);
-  EXPECT_LE(query.statistics().groups_bounded, 250U);
-  run();
-  EXPECT_EQ(query.statistics().objects_placed, 0U);
-  EXPECT_EQ(query.statistics().groups_bounded, 0U);
-  const auto moving =
-      static_cast<std::size_t>(std::find(frames.begin(), frames.end(), "frame 0") - frames.begin());
-  ASSERT_LT(moving, frames.size());
-  nothing.X_FB.resize(1);
-  posed.X_FB[moving].translation().x() = -1.5;  // object 0 is 0.4 m away then
-  run();
-  EXPECT_EQ(query.statistics().objects_placed, 1U);
-  EXPECT_EQ(results[0].state, LinkState::kNear);
-  EXPECT_NEAR(results[0].distance, 0.4, 1e-9);
-}
-
 }  // namespace
 }  // namespace ist

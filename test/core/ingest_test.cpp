@@ -269,75 +269,6 @@ IngestConfig without_limits() {
   return config;
 }
 
-// Every tile has one parent, every box bounds the points in its subtree, and unused slots are at
-// kFarAway.
-// @param slack  [m] by how much boxes of tiles may be larger
-// @param near   [m] from the fixed frame's origin: boxes farther away may be larger by any size
-void expect_hierarchy(const PointIndex& point_index, float slack = 0.0F, double near = kInf) {
-  const Eigen::Vector3f p_OF = point_index.X_FO().inverse().translation().cast<float>();
-  const PointBvh& index = point_index.bvh();
-  const std::size_t tiles = index.tile_count();
-  std::vector<Eigen::AlignedBox3f> boxes(tiles + index.nodes().size());
-  std::vector<int> parents(boxes.size(), 0);
-  for (std::size_t i = 0; i < tiles; ++i) {
-    PointTile scratch;
-    const PointTile& tile = index.tile(i, &scratch);
-    for (int k = 0; k < kPointWidth; ++k) {
-      const Eigen::Vector3f p(tile.x[k], tile.y[k], tile.z[k]);
-      if (k < tile.count) boxes[i].extend(p);
-      ASSERT_TRUE(k < tile.count || p == Eigen::Vector3f::Constant(kFarAway));
-    }
-  }
-  for (std::size_t i = 0; i < index.nodes().size(); ++i) {
-    const BoxNode& node = index.nodes()[i];
-    for (int k = 0; k < kPointWidth; ++k) {
-      const Eigen::Vector3f min(node.min_x[k], node.min_y[k], node.min_z[k]);
-      const Eigen::Vector3f max(node.max_x[k], node.max_y[k], node.max_z[k]);
-      if (k >= node.count) {
-        ASSERT_TRUE(min == max && min == Eigen::Vector3f::Constant(kFarAway));
-        continue;
-      }
-      const std::int32_t child = node.child[k];
-      const std::size_t at =
-          child < 0 ? static_cast<std::size_t>(~child) : tiles + static_cast<std::size_t>(child);
-      ASSERT_TRUE(child < static_cast<std::int32_t>(i)) << "children come before their parent";
-      ++parents[at];
-      const Eigen::AlignedBox3f box(min, max);
-      if (child < 0) {
-        ASSERT_TRUE(box.contains(boxes[at]));
-        const bool is_near = static_cast<double>(box.exteriorDistance(p_OF)) <= near;
-        const float allowed = is_near ? slack : kFarAway;
-        ASSERT_TRUE(((boxes[at].min() - min).array() <= allowed).all());
-        ASSERT_TRUE(((max - boxes[at].max()).array() <= allowed).all());
-      } else {
-        ASSERT_TRUE(min == boxes[at].min() && max == boxes[at].max());
-      }
-      boxes[tiles + i].extend(box);
-    }
-  }
-  ASSERT_EQ(index.root() + 1, static_cast<std::int32_t>(index.nodes().size()));
-  for (std::size_t i = 0; i + 1 < parents.size(); ++i) ASSERT_EQ(parents[i], 1);
-  if (!boxes.empty()) {
-    ASSERT_TRUE(boxes.back().isApprox(index.bounds(), 0.0F));
-  }
-}
-
-// Tiles that the self-filter has taken points from have new boxes. One that is smaller than its
-// points makes queries pass them by.
-TEST(Ingest, boxesHoldWhatTheSelfFilterLeaves) {
-  const auto model = test::make_model({Sphere{0.5}}, 0.02);
-  PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
-  const Message message(random_points(20000, 1.0, 4), {});
-  IngestConfig config = without_limits();
-  config.self_filter = true;
-  CloudSnapshot snapshot;
-  Ingest(config).run(message.raw, pose(0.2, 0.0, 0.0), {solid}, 0.0, &snapshot);
-  EXPECT_GT(snapshot.counts.on_robot, 500U);
-  EXPECT_GT(snapshot.counts.used, 10000U);
-  constexpr double kOnRobot = 0.52;  // the radius and the padding
-  expect_hierarchy(snapshot.index, 0.0F, kOnRobot);
-}
-
 // The two indices have different frames, so their points are rounded to float differently.
 void expect_same(const std::map<std::uint32_t, Eigen::Vector3d>& a,
                  const std::map<std::uint32_t, Eigen::Vector3d>& b) {
@@ -385,15 +316,6 @@ void check_images(const Format& format, unsigned blind) {
     EXPECT_EQ(a.counts.infinite, b.counts.infinite);
     EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
     expect_same(points_by_id(a.index), points_by_id(b.index));
-    // No tile spans the depth discontinuity of 0.6 m at the board's edge.
-    for (const PointTile& tile : test::tiles_of(b.index)) {
-      Eigen::AlignedBox3f box;
-      for (int k = 0; k < tile.count; ++k) {
-        box.extend(Eigen::Vector3f(tile.x[k], tile.y[k], tile.z[k]));
-      }
-      ASSERT_LT(box.diagonal().norm(), 0.25F);
-    }
-    expect_hierarchy(b.index, 4e-6F);  // a millionth of the range, for each change of frame
   }
 }
 
@@ -470,26 +392,6 @@ TEST(Ingest, imageAtItsRangeIsCutAsAListIs) {
   }
 }
 
-// Rows and columns of a shuffled image are unrelated to space. The index must be as good as that of
-// an unorganized cloud.
-TEST(Ingest, shuffledImageIsIndexedAsAList) {
-  Points points = depth_image(160, 120);
-  std::shuffle(points.begin(), points.end(), std::mt19937(9));
-  Format organized;
-  organized.width = 160;
-  const CloudSnapshot a = ingest(points), b = ingest(points, {}, organized);
-  EXPECT_EQ(points_by_id(a.index), points_by_id(b.index));
-  EXPECT_EQ(a.index.bvh().tile_count(), b.index.bvh().tile_count());
-}
-
-TEST(Ingest, thinnedCloudCanBeLeftOut) {
-  IngestConfig config;
-  config.thin = false;
-  const CloudSnapshot snapshot = ingest(random_points(1000, 1.0, 3), config);
-  EXPECT_FALSE(snapshot.index.empty());
-  EXPECT_TRUE(snapshot.index.bvh().thinned().empty());
-}
-
 // A sensor that tf places at 10^16 m: coordinates there are whole metres, so no bound means
 // anything.
 TEST(Ingest, refusesASensorFarOut) {
@@ -550,11 +452,6 @@ TEST(Ingest, farOutliersDoNotMoveTheOrigin) {
   for (int i = 0; i < 50; ++i) points.emplace_back(1e8, -1e8, 1e8);
   const CloudSnapshot snapshot = ingest(points, without_limits(), float64());
   EXPECT_EQ(snapshot.index.X_FO().translation(), Eigen::Vector3d(0, 0, 0));
-}
-
-TEST(Ingest, originIsOnWholeMetres) {
-  const CloudSnapshot snapshot = ingest(random_points(50, 1.0, 7), {}, {}, pose(1.4, -2.6, 0.2));
-  EXPECT_EQ(snapshot.index.X_FO().translation(), Eigen::Vector3d(1, -3, 0));
 }
 
 // The formats cover every code path that reads points: float or double, organized or unorganized,
@@ -629,20 +526,6 @@ TEST(Ingest, namesTheFaultyMemberOfItsConfiguration) {
   }
 }
 
-TEST(Ingest, buffersAreReused) {
-  const Points points = random_points(20000, 1.5, 8);
-  const Message message(points, {});
-  Ingest ingest({});
-  CloudSnapshot snapshot;
-  ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
-  PointTile scratch;
-  const PointTile* tiles = &snapshot.index.bvh().tile(0, &scratch);
-  const auto expected = points_by_id(snapshot.index);
-  for (int i = 0; i < 3; ++i) ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
-  EXPECT_EQ(&snapshot.index.bvh().tile(0, &scratch), tiles);
-  EXPECT_EQ(points_by_id(snapshot.index), expected);
-}
-
 std::vector<std::int64_t> cell_of(const Eigen::Vector3d& p, double edge) {
   return {static_cast<std::int64_t>(std::floor(p.x() / edge)),
           static_cast<std::int64_t>(std::floor(p.y() / edge)),
@@ -676,23 +559,6 @@ void check_cells() {
 
 TEST(Thinning, keepsThePointNearestToTheCentreOfEachOccupiedVoxel) {
   test::for_each_instruction_set(check_cells);
-}
-
-TEST(Thinning, doesNotDependOnTheOrderOfPoints) {
-  IngestConfig config = without_limits();
-  config.thinning = 0.05;
-  Points points = random_points(5000, 0.5, 10);
-  points.insert(points.end(), points.begin(), points.begin() + 100);  // duplicates
-  const auto coordinates = [&config](const Points& cloud) {
-    std::set<std::vector<double>> set;
-    for (const auto& [id, p] : test::thinned_points_of(ingest(cloud, config).index)) {
-      set.insert({p.x(), p.y(), p.z()});
-    }
-    return set;
-  };
-  const auto expected = coordinates(points);
-  std::shuffle(points.begin(), points.end(), std::mt19937(1));
-  EXPECT_EQ(coordinates(points), expected);
 }
 
 // The voxel grid belongs to the fixed frame, not to the sensor or the index's origin.

@@ -2,16 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <limits>
 #include <utility>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
-#include "support/meshes.h"
 #include "support/scene.h"
 #include "support/tiles.h"
 #include "support/whole_cloud.h"
@@ -206,41 +203,6 @@ TEST(LaserScan, SelfFilterDividesATileByTime) {
     EXPECT_EQ(snapshot.counts.on_robot, static_cast<std::uint32_t>(last + 1));
     EXPECT_EQ(snapshot.index.size(), points.size() - static_cast<std::size_t>(last + 1));
   }
-}
-
-// A scan of ten seconds has 400 instants. Its 50,000 beams were compared with every link at each of
-// them, which took 200 times as long as with one.
-TEST(LaserScan, SelfFilterOfALongScanIsBounded) {
-  const auto model = test::make_model({test::l_shape(0.4, 0.1)}, 0.005);
-  const std::vector<float> ranges(20000, 0.45F);
-  LaserScan scan = scan_of(ranges);
-  scan.angle_increment = 3.0 / 20000;
-  ScanPoints points;
-  to_points(scan, 0.0, 5.0, Eigen::Isometry3d::Identity(), &points);
-  IngestConfig config = test::whole_cloud();
-  config.self_filter = true;
-  Ingest ingest(config);
-  const auto seconds = [&](std::uint32_t poses) {
-    std::vector<PosedSolid> robot;
-    for (std::uint32_t i = 0; i < poses; ++i) {
-      PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
-      solid.X_FL.linear() =
-          Eigen::AngleAxisd(6.0 * i / poses, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-      solid.first_point = i * 20000 / poses;
-      solid.last_point = (i + 1) * 20000 / poses;
-      robot.push_back(solid);
-    }
-    CloudSnapshot snapshot;
-    double least = std::numeric_limits<double>::infinity();
-    for (int run = 0; run < 3; ++run) {
-      ingest.run(points.raw(), Eigen::Isometry3d::Identity(), robot, 0.0, &snapshot);
-      least = std::min(least, snapshot.ingest_time);
-    }
-    return least;
-  };
-  const double one = seconds(1), many = seconds(400);
-  std::printf("400 poses take %.1f times as long as one (%.1f ms)\n", many / one, 1e3 * one);
-  EXPECT_LT(many, 20.0 * one);
 }
 
 TEST(CheckScan, NamesTheFaultyMember) {

@@ -9,7 +9,6 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_batch.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "support/allocations.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/scene.h"
@@ -96,24 +95,6 @@ TEST(LazyTiles, AnswersAgainstBruteForce) {
       EXPECT_NEAR(links[k].distance, scene.truth(k), 2e-6) << "scene " << i << ", link " << k;
     }
   }
-}
-
-TEST(LazyTiles, LoadingAllocatesNothing) {
-  test::Rng rng(72);
-  const Scene scene(&rng);
-  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
-  Ingest ingest(test::whole_cloud(false));
-  CloudSnapshot cloud, other;
-  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
-  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &other);
-  ProximityQuery query(model, {});
-  std::vector<LinkProximity> links;
-  query.run(scene.X_FL, {true, true, true}, {&cloud}, &links);
-  const std::vector<const CloudSnapshot*> clouds = {&other};
-  const std::vector<bool> known = {true, true, true};
-  const long before = test::allocations;
-  query.run(scene.X_FL, known, clouds, &links);
-  EXPECT_EQ(test::allocations - before, 0);
 }
 
 // All threads begin when no tile is loaded.

@@ -16,7 +16,6 @@
 #include "support/data_dir.h"
 #include "support/demo_arm.h"
 #include "support/link_pair_oracle.h"
-#include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
@@ -296,7 +295,6 @@ TEST(LinkPairExact, AMotionGivesTheAnswersOfFreshQueries) {
     SelfQuery query(robot.model, pairs, config), fresh(robot.model, pairs, config);
     std::vector<PairProximity> kept, anew;
     std::vector<Eigen::Isometry3d> X_FL(robot.geometry.size());
-    std::uint64_t steps = 0, fresh_steps = 0;
     const std::vector<bool> known(X_FL.size(), true);
     for (int motion = 0; motion < test::scaled(4); ++motion) {
       for (auto& X : X_FL) X = test::random_pose(&rng, 0.2);
@@ -316,8 +314,6 @@ TEST(LinkPairExact, AMotionGivesTheAnswersOfFreshQueries) {
           far[i].translation().x() += 5.0 * static_cast<double>(i);
         fresh.run(far, known, &anew);
         fresh.run(X_FL, known, &anew);
-        steps += query.statistics().steps;
-        fresh_steps += fresh.statistics().steps;
         for (std::size_t i = 0; i < pairs.size(); ++i) {
           const bool has_insides = has_inside(pairs[i].first) && has_inside(pairs[i].second);
           expect_same(kept[i], anew[i], tolerance, has_insides,
@@ -326,8 +322,6 @@ TEST(LinkPairExact, AMotionGivesTheAnswersOfFreshQueries) {
         }
       }
     }
-    // 1.99 times at one tolerance; most of them about openings, which are searched anew.
-    EXPECT_LT(19 * steps, 10 * fresh_steps) << "the front is of use";
   }
 }
 
@@ -359,52 +353,6 @@ TEST(LinkPairExact, BoundsHoldHoweverFarLinksHaveMoved) {
                   "trial " + std::to_string(trial) + " step " + std::to_string(i));
       ASSERT_FALSE(HasFatalFailure());
     }
-  }
-}
-
-// Hulls of parts answer where the links' own hulls and boxes do not: rings in one another, 1 mm
-// apart, took 1369 pairs by boxes alone.
-TEST(LinkPairExact, HullsOfPartsSpareBoxes) {
-  const auto ring = [](double radius) { return test::torus(radius, 0.005, 96, 24); };
-  const auto model = test::make_model({ring(0.1), ring(0.111)}, 0.01);
-  SelfQuery query(model, {{0, 1}}, {});
-  std::vector<PairProximity> results;
-  std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
-  query.run(X_FL, {true, true}, &results);
-  EXPECT_EQ(results[0].state, LinkState::kNear);
-  EXPECT_LE(results[0].distance - results[0].lower_bound, QueryConfig().tolerance + 1e-9);
-  EXPECT_LT(query.statistics().steps, 300U);
-}
-
-// What is kept spares most of the search: closed links without convex shape, 0.1 to 0.2 mm a step.
-TEST(LinkPairExact, AMotionSparesMostSteps) {
-  test::Rng rng(23);
-  std::vector<Shape> links;
-  for (int i = 0; i < 8; ++i) {
-    links.push_back(i % 2 == 0 ? test::random_lump(&rng) : test::torus(0.08, 0.02, 24, 12));
-  }
-  const auto model = test::make_model(links, 0.01);
-  std::vector<LinkPair> pairs;
-  for (std::size_t k = 1; k < links.size(); ++k) pairs.push_back({k - 1, k});
-  const std::vector<bool> known(links.size(), true);
-  for (const double tolerance : {0.0, 0.001}) {
-    QueryConfig config;
-    config.tolerance = tolerance;
-    SelfQuery query(model, pairs, config);
-    std::vector<PairProximity> results;
-    std::uint64_t steps = 0, fresh_steps = 0;
-    for (int motion = 0; motion < 10; ++motion) {
-      std::vector<Eigen::Isometry3d> X_FL(links.size());
-      for (auto& X : X_FL) X = test::random_pose(&rng, 0.2);
-      const Point velocity = test::random_vector(&rng, 1e-4);
-      for (int step = 0; step < 100; ++step) {
-        for (std::size_t i = 0; i < X_FL.size(); i += 2) X_FL[i].translation() += velocity;
-        query.run(X_FL, known, &results);
-        (step == 0 ? fresh_steps : steps) += query.statistics().steps;
-      }
-    }
-    // 18 and 6 % of the steps of a fresh query, at each of the 99 poses that follow one.
-    EXPECT_LT((tolerance > 0.0 ? 15 : 5) * steps, 99 * fresh_steps) << "at tolerance " << tolerance;
   }
 }
 

@@ -193,16 +193,6 @@ TEST(MemoryMap, MemoryIsBoundedAndWhatIsOldGoesFirst) {
   EXPECT_EQ(map.state({1.01, 19.9, 0.0}), VoxelState::kOccupied);
 }
 
-TEST(MemoryMap, ACloudWithoutMemorySaysHowMuchIsSkipped) {
-  MemoryConfig config;
-  config.max_nodes = 4096;
-  MemoryMap map(config);
-  map.insert(wall(1.0F, 0.0));
-  EXPECT_GT(map.counts().skipped, 0U);
-  EXPECT_GT(map.counts().lost, 0U);
-  EXPECT_LE(map.counts().nodes, 4096U);
-}
-
 TEST(MemoryMap, NothingOutsideTheRegion) {
   MemoryMap map{{}};
   RegionOfInterest region;

@@ -1,26 +1,21 @@
-// Queries near the link and among ties.
+// Queries near the link.
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
-#include "support/distance_fields.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
-#include "support/shape_oracle.h"
 #include "support/trial.h"
 
 namespace ist {
 namespace {
 
 using Point = Eigen::Vector3d;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 const std::vector<Shape>& shapes() {
   static const std::vector<Shape> kShapes = {
@@ -133,47 +128,6 @@ TEST(NearSurface, TheSideIsThatOfDoublePrecisionHoweverLargeTheMesh) {
   }
   EXPECT_GT(inside, test::scaled(3000));
   EXPECT_GT(outside, test::scaled(3000));
-}
-
-// Points about equally near on all sides, at a distance from the link: after the first query few of
-// them are measured again, though every one of them is within twice the tolerance.
-TEST(NearSurface, KeepsTheBoundsOfTies) {
-  const std::vector<Shape> bodies = {Cylinder{0.05, 0.3}, Box{{0.2, 0.16, 0.1}}};
-  const test::Trial trial(bodies, 0.005);
-  test::Rng rng(172);
-  for (std::size_t l = 0; l < bodies.size(); ++l) {
-    SCOPED_TRACE(trial.model().links[l].name);
-    const Solid& solid = trial.model().links[l].solid;
-    for (const double gap : {0.002, 0.02, 0.05}) {
-      SCOPED_TRACE("gap " + std::to_string(gap));
-      std::vector<Point> points;
-      while (points.size() < 20000) {
-        const Point p = test::random_vector(&rng, 0.4);
-        const SignedDistance from = solid.signed_distance(p);
-        if (!(from.distance > gap)) continue;
-        points.push_back(from.witness + (gap + test::uniform(&rng, 0, 5e-4)) * from.normal);
-      }
-      const CloudSnapshot cloud = test::make_snapshot(points);
-      const std::vector<Point> stored = test::stored_points(cloud.index);
-      ProximityQuery query(test::with_fields(trial.shared_model()), QueryConfig());
-      LinkProximity result;
-      Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-      std::uint64_t measured = 0;
-      constexpr int kSteps = 40;
-      for (int i = 0; i < kSteps; ++i) {
-        X_FL = small_motion(2e-5, &rng) * X_FL;
-        ASSERT_TRUE(query.run_link(l, X_FL, {&cloud}, &result));
-        if (i > 0) measured += query.statistics().exact_evaluations;
-        double truth = kInfinity;
-        for (const Point& p : stored) {
-          truth = std::min(truth, solid.signed_distance(X_FL.inverse() * p).distance);
-        }
-        ASSERT_LE(result.lower_bound, truth) << "step " << i;
-        ASSERT_LE(result.distance, truth + 0.001 + 1e-9) << "step " << i;
-      }
-      EXPECT_LT(measured / kSteps, 500U);
-    }
-  }
 }
 
 }  // namespace

@@ -2,17 +2,23 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "internal/cloud/point_bvh.h"
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "support/distance_fields.h"
+#include "support/hostile_meshes.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
+#include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/trial.h"
 
 namespace ist {
 namespace {
@@ -150,72 +156,101 @@ TEST(WithoutTime, IsMadeUpForWhereverAQueryIsStopped) {
   EXPECT_GT(proven, test::kSanitized ? -1 : 98 * answers / 100);
 }
 
-// A bound that was proven for one cloud is not taken for another, nor for a pose far away.
-TEST_F(NoTime, BoundsBelongToTheirScene) {
-  QueryConfig config;
-  config.max_distance = 5.0;
-  config.deadline = 1e3;
-  ProximityQuery query(model_, config);
-  for (int i = 0; i < test::scaled(100); ++i) {
-    next_scene();
-    for (int step = 0; step < 3; ++step) {
-      std::vector<LinkProximity> results;
-      Deadline::asks_left_for_test = (i + step) % 4;
-      query.run(X_FL_, known_, {&wall_, &near_}, &results);
-      Deadline::asks_left_for_test = -1;
-      for (std::size_t k = 0; k < results.size(); ++k) {
-        ASSERT_LE(results[k].lower_bound, truth(k) + 1e-9) << "scene " << i;
+// Bounds of links that a deadline leaves unfinished: whatever is told of a link whose state is
+// known is a number, and no point is deeper than it says.
+
+// The model without a field, with a coarse one and with a fine one.
+std::vector<std::shared_ptr<const RobotModel>> models_of(const LinkGeometry& link) {
+  const auto without = test::model_of({link}, 0.01);
+  return {without, test::with_fields(without, 1), test::with_fields(without)};
+}
+
+// The winding number of many copies of a triangle is large in all of the box about them, also at
+// its corner, which is farther from them than the radius of the sphere about them.
+TEST(StoppedBounds, WhatAMeshWithHolesEnclosesMayBeDeeperThanItsSphere) {
+  const TriangleMesh triangle{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}}};
+  TriangleMesh copies = triangle;
+  for (int i = 1; i < 20; ++i) copies = test::joined(copies, triangle);
+  const LinkGeometry link = test::one(copies);
+  const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  const std::vector<bool> known = {true};
+  std::vector<Eigen::Vector3d> points = {Eigen::Vector3d::Constant(0.9995)};
+  int inside = 0;
+  for (const auto& model : models_of(link)) {
+    const LinkModel& packed = model->links.front();
+    const double depth = -packed.solid.signed_distance(points.front()).distance;
+    ASSERT_GT(depth, packed.tree.radius());
+    for (const std::size_t others : {0U, 2U, 2000U}) {
+      points.resize(1);
+      for (std::size_t k = 0; k < others; ++k) {
+        points.push_back(Eigen::Vector3d::Constant(0.5 + 0.48 * static_cast<double>(k) /
+                                                             static_cast<double>(others)));
       }
-      for (Eigen::Isometry3d& X : X_FL_) {
-        X.translation() += test::random_vector(&rng_, step == 0 ? 0.01 : 0.5);
+      const CloudSnapshot cloud = test::make_snapshot(points);
+      for (const double deadline : {1e-12, 1e-5, 0.0}) {
+        QueryConfig config;
+        config.max_distance = 10.0;
+        config.deadline = deadline;
+        ProximityQuery query(model, config);
+        std::vector<LinkProximity> results;
+        query.run({X_FL}, known, {&cloud}, &results);
+        if (results.front().state == LinkState::kUnknown) continue;
+        ++inside;
+        ASSERT_LE(results.front().lower_bound, -depth + 2e-7) << others << ", " << deadline;
       }
     }
   }
+  EXPECT_GT(inside, 9);
 }
 
-// A box 0.1 mm above a plane of points, on a motion without any time: no sphere is so fine. The
-// plane across the obstacle that was measured proves that the box is free, at each pose again.
-TEST(WithoutTime, ABoxJustAboveAPlaneIsFreeWithoutTime) {
-  const auto model = test::make_model({Box{{0.2, 0.2, 0.1}}}, 0.005);
-  Points plane;
-  for (int i = 0; i < 100; ++i) {
-    for (int k = 0; k < 100; ++k) plane.emplace_back(0.01 * i - 0.5, 0.01 * k - 0.5, 0.0);
+TEST(StoppedBounds, AKnownLinkHasAFiniteBound) {
+  test::Rng rng(21);
+  int known_links = 0, unfinished = 0;
+  for (const TriangleMesh& mesh :
+       {test::moebius_strip(0.1, 0.04, 20), test::open_box({0.1, 0.1, 0.1})}) {
+    const LinkGeometry link = test::one(mesh);
+    for (const auto& model : models_of(link)) {
+      for (const bool has_extent : {false, true}) {
+        ProximityQuery query(model, {});
+        Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+        for (int round = 0; round < test::scaled(40); ++round) {
+          std::vector<Eigen::Vector3d> points;
+          for (int k = 0; k < 400; ++k) points.push_back(test::random_vector(&rng, 0.12));
+          CloudSnapshot cloud = test::make_snapshot(points);
+          if (has_extent) {
+            cloud.extent.constant = cloud.extent.linear = 0.01;
+            cloud.extent.max_range = 5.0;
+            cloud.extent.p_FS = Eigen::Vector3d::UnitX();
+          }
+          for (int step = 0; step < 8; ++step) {
+            QueryConfig config;
+            config.deadline = std::pow(10.0, test::uniform(&rng, -5.5, -3.5));
+            query.set_config(config);
+            std::vector<LinkProximity> results;
+            query.run({X_FL}, {true}, {&cloud}, &results);
+            const LinkProximity& result = results.front();
+            if (result.state >= LinkState::kNear) {
+              ++known_links;
+              ASSERT_TRUE(std::isfinite(result.lower_bound)) << "round " << round;
+              ASSERT_TRUE(std::isfinite(result.sensor_width)) << "round " << round;
+              const test::Truth truth = test::truth_of(link, X_FL, points, cloud);
+              ASSERT_LE(result.lower_bound, std::max(truth.measured, truth.stored) + 2e-8);
+              const double width = result.distance - result.lower_bound - result.sensor_width;
+              if (width > config.tolerance + 1e-6) {
+                ++unfinished;
+                ASSERT_EQ(query.statistics().unfinished, 1U);
+                ASSERT_GE(query.statistics().widest, width - 1e-12);
+              }
+            }
+            X_FL = X_FL * test::random_pose(&rng, 0.001);
+            X_FL.translation() *= 0.9;
+          }
+        }
+      }
+    }
   }
-  const CloudSnapshot cloud = test::make_snapshot(plane);
-  QueryConfig config;
-  config.deadline = 1e-9;
-  ProximityQuery query(model, config);
-  std::vector<LinkProximity> results;
-  for (int step = 0; step < 100; ++step) {
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-    X_FL.translation() = Eigen::Vector3d(1e-3 * step, 0.0, 0.0501);
-    // What is made late is made, as where no other process takes the processor.
-    Deadline::late_for_test = 0.0;
-    query.run({X_FL}, {true}, {&cloud}, &results);
-    Deadline::late_for_test = -1.0;
-    ASSERT_EQ(results[0].state, LinkState::kNear);
-    ASSERT_LE(results[0].lower_bound, 1e-4 + 1e-9);
-    EXPECT_GT(results[0].lower_bound, 0.0);
-  }
-}
-
-// A share of a deadline passes no later than the whole one, and not before its time.
-TEST(WithoutTime, SharesOfADeadline) {
-  Deadline never(0.0);
-  EXPECT_FALSE(Deadline(&never, 10).passed());
-  Deadline whole(1000.0);
-  EXPECT_FALSE(Deadline(&whole, 1).passed());
-  EXPECT_FALSE(Deadline(&whole, 10).passed());
-  Deadline small(&whole, 1000000000);
-  while (!small.passed()) {
-  }
-  EXPECT_FALSE(whole.has_passed());
-  EXPECT_FALSE(small.passed_by(100.0));
-  Deadline over(1e-9);
-  Deadline rest(&over, 2);
-  EXPECT_TRUE(rest.passed());
-  EXPECT_TRUE(rest.passed_by(0.0));
-  EXPECT_TRUE(over.has_passed());
+  EXPECT_GT(known_links, test::scaled(1000));
+  EXPECT_GT(unfinished, 10);
 }
 
 }  // namespace

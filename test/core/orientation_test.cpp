@@ -1,5 +1,3 @@
-#include "geometry/orientation.h"
-
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -7,6 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/orientation.h"
+#include "internal/geometry/hole_caps.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "support/hostile_meshes.h"
 #include "support/meshes.h"
 
@@ -105,6 +106,30 @@ TEST(OrientOutward, CanBeCancelled) {
     EXPECT_EQ(asked, last);
     EXPECT_EQ(part.triangles, mesh.triangles) << "what is cancelled changes nothing";
   }
+}
+
+// The winding number of any mesh together with its caps is an integer.
+TEST(HoleCaps, CloseEveryMesh) {
+  std::size_t open_meshes = 0;
+  for (const test::HostileMesh& hostile : test::hostile_meshes()) {
+    SCOPED_TRACE(hostile.name);
+    TriangleMesh mesh = hostile.mesh;
+    bool is_mesh = true;
+    for (const TriangleMesh::Triangle& t : mesh.triangles) {
+      for (const std::uint32_t v : t) {
+        is_mesh = is_mesh && v < mesh.vertices.size() && mesh.vertices[v].allFinite();
+      }
+    }
+    if (!is_mesh) continue;
+    const std::vector<OpenEdge> open = open_edges(mesh);
+    const TriangleMesh caps = hole_caps(mesh, open);
+    EXPECT_EQ(caps.triangles.empty(), open.empty());
+    if (open.empty()) continue;
+    ++open_meshes;
+    mesh.triangles.insert(mesh.triangles.end(), caps.triangles.begin(), caps.triangles.end());
+    EXPECT_EQ(count_boundary_edges(mesh), 0U);
+  }
+  EXPECT_GE(open_meshes, 5U);
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "geometry/open_edge_hierarchy.h"
@@ -30,35 +29,6 @@ TriangleMesh perforated(int n) {
   }
   mesh.triangles = kept;
   return mesh;
-}
-
-TEST(OutsideMargin, HoldsNoPlaceInside) {
-  test::Rng rng(181);
-  int positive = 0, large = 0;
-  for (const TriangleMesh& mesh :
-       {test::open_box({0.15, 0.1, 0.2}), perforated(3), perforated(10), perforated(1000)}) {
-    const Solid solid({GeometryElement{mesh, Eigen::Isometry3d::Identity(), "test"}});
-    ASSERT_FALSE(solid.is_closed());
-    for (int i = 0; i < test::scaled(3000); ++i) {
-      const Eigen::Vector3d p = test::random_vector(&rng, i % 2 == 0 ? 0.15 : 0.11);
-      const double distance = std::abs(solid.signed_distance(p).distance);
-      const SideMargin found = outside_margin(solid, p, distance);
-      ASSERT_EQ(found.is_inside, solid.is_inside(p));
-      ASSERT_LE(found.margin, distance);
-      if (!(found.margin > 0.0)) continue;
-      ASSERT_FALSE(found.is_inside);
-      ++positive;
-      large += found.margin > 1e-3 ? 1 : 0;
-      for (int k = 0; k < 10; ++k) {
-        const Eigen::Vector3d offset = found.margin *
-                                       (k % 2 == 0 ? 1.0 : std::sqrt(test::uniform(&rng, 0, 1))) *
-                                       test::random_vector(&rng, 1.0).normalized();
-        ASSERT_FALSE(solid.is_inside(p + offset)) << p.transpose() << ", " << offset.norm();
-      }
-    }
-  }
-  EXPECT_GT(positive, test::scaled(2000));
-  EXPECT_GT(large, test::scaled(1000));
 }
 
 // Every triangle twice: the winding number is above 1/2 beyond the open side, too.
@@ -191,39 +161,6 @@ TEST(OutsideMargin, WindingNumberIsSteady) {
   }
 }
 
-// The field of a straight edge (Biot and Savart).
-Eigen::Vector3d field_of(const Eigen::Vector3d& from, const Eigen::Vector3d& along,
-                         const Eigen::Vector3d& p) {
-  constexpr int kParts = 1000;
-  Eigen::Vector3d field = Eigen::Vector3d::Zero();
-  for (int i = 0; i < kParts; ++i) {
-    const Eigen::Vector3d r = from + (i + 0.5) / kParts * along - p;
-    field += r.cross(along / kParts) / std::pow(r.norm(), 3);
-  }
-  return field;
-}
-
-// The field of a short edge falls with the cube of the distance, which the bound of its derivative
-// just allows; from afar, where a cluster is seen as a sphere, a little more.
-TEST(OutsideMargin, CurvatureOfOneEdge) {
-  constexpr double kLength = 1e-3, kStep = 1e-3;
-  const Eigen::Vector3d from(0.0, -0.5 * kLength, 0.0), along(0.0, kLength, 0.0);
-  const std::vector<OpenEdgeHierarchy::Edge> edges = {{from, from + along}};
-  const OpenEdgeHierarchy edge(edges);
-  for (const double distance : {0.003, 0.006, 0.01, 1.0}) {
-    const Eigen::Vector3d p(distance, 0.0, 0.0);
-    const OpenEdgeSums sums = edge.sums(p);
-    const Eigen::Vector3d step = kStep * p;
-    const Eigen::Vector3d change =
-        field_of(from, along, p + step) - field_of(from, along, p - step);
-    const double slope = change.norm() / (2.0 * step.norm());
-    EXPECT_LE(slope, sums.curvature);
-    EXPECT_GT(slope, (distance < 0.005 ? 0.8 : 0.7) * sums.curvature);
-    EXPECT_LE(sums.nearest, distance);
-    EXPECT_GT(sums.nearest, 0.8 * distance);
-  }
-}
-
 // Edges in a ball of radius 1; some of them count more than once.
 std::vector<OpenEdgeHierarchy::Edge> random_edges(std::size_t count, test::Rng* rng) {
   std::vector<OpenEdgeHierarchy::Edge> edges;
@@ -235,33 +172,6 @@ std::vector<OpenEdgeHierarchy::Edge> random_edges(std::size_t count, test::Rng* 
     edges.push_back({from, from + along, edges.size() % 5 == 0 ? 2.0 : 1.0});
   }
   return edges;
-}
-
-// The field is as wrong as it says, at most: from nearby, where edges are summed up, and from afar,
-// where clusters are.
-TEST(OutsideMargin, FieldErrorIsBounded) {
-  test::Rng rng(184);
-  for (const std::size_t count : {1U, 7U, 8U, 9U, 63U, 65U, 300U}) {
-    double most_used = 0.0;
-    for (int i = 0; i < (count < 10 ? 100 : 20); ++i) {
-      const std::vector<OpenEdgeHierarchy::Edge> edges = random_edges(count, &rng);
-      const double away = std::pow(10.0, test::uniform(&rng, -1.3, 2.5));
-      const Eigen::Vector3d p = (1.0 + away) * test::random_vector(&rng, 1.0).normalized();
-      const OpenEdgeSums sums = OpenEdgeHierarchy(edges).sums(p);
-      Eigen::Vector3d error(-sums.field[0], -sums.field[1], -sums.field[2]);
-      double quadrature = 0.0, nearest = std::numeric_limits<double>::infinity();
-      for (const OpenEdgeHierarchy::Edge& edge : edges) {
-        const Eigen::Vector3d field = edge.count * field_of(edge.from, edge.to - edge.from, p);
-        error += field;
-        quadrature += 1e-6 * field.norm();
-        nearest = std::min({nearest, (p - edge.from).norm(), (p - edge.to).norm()});
-      }
-      ASSERT_LE(error.norm(), sums.field_error + quadrature) << count << " edges, " << p.norm();
-      ASSERT_LE(sums.nearest, nearest);
-      most_used = std::max(most_used, error.norm() / sums.field_error);
-    }
-    EXPECT_GT(most_used, 0.01) << "the error of " << count << " edges is never so large";
-  }
 }
 
 // What float loses is within what it says, where many edges of a mesh are near, with every
@@ -287,26 +197,6 @@ void check_many_near_edges() {
 }
 
 TEST(OutsideMargin, FieldOfManyNearEdges) { test::for_each_instruction_set(check_many_near_edges); }
-
-// Two sheets whose borders meet in opposite directions change it little, though each one alone
-// would: the fields of their edges cancel.
-TEST(OutsideMargin, SeamsCancel) {
-  TriangleMesh two = fan(7, 0.1);
-  TriangleMesh other = fan(9, 0.1 + 1e-5);
-  const auto first = static_cast<std::uint32_t>(two.vertices.size());
-  two.vertices.insert(two.vertices.end(), other.vertices.begin(), other.vertices.end());
-  for (const TriangleMesh::Triangle& t : other.triangles) {
-    two.triangles.push_back({first + t[0], first + t[2], first + t[1]});
-  }
-  constexpr double kChange = 0.2;
-  const Eigen::Vector3d p(0.11, 0.0, 0.0);
-  const double alone = OpenEdgeHierarchy(fan(7, 0.1)).steady_radius(p, kChange, 0.1);
-  const double both = OpenEdgeHierarchy(two).steady_radius(p, kChange, 0.1);
-  EXPECT_LT(alone, 0.01);
-  EXPECT_GT(both, 0.7 * alone) << "there are twice as many edges";
-  test::Rng rng(183);
-  check_steady(two, 0.1, &rng);
-}
 
 // The edges of a large mesh take a second to collect, which nothing could end.
 TEST(OutsideMargin, EdgesCanBeCancelled) {

@@ -5,22 +5,18 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "internal/geometry/mesh_io.h"
 #include "internal/packing/packer.h"
 #include "internal/packing/packing_cache.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "support/data_dir.h"
 #include "support/meshes.h"
-#include "support/sanitizers.h"
 #include "support/temp_dir.h"
 
 namespace ist {
@@ -29,10 +25,6 @@ namespace {
 namespace fs = std::filesystem;
 constexpr PackingOrder kOrders[] = {PackingOrder::kMedial, PackingOrder::kDisjoint,
                                     PackingOrder::kVolume};
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 TEST(PackingCheck, EveryOrderAndNumberOfSpheresPasses) {
   const Shape shapes[] = {
@@ -203,35 +195,6 @@ TEST(PackingCheck, CanBeCancelled) {
   EXPECT_EQ(packing_fault(shape, config, packing, [&](double) { return ++asked < 3; }),
             "its check was cancelled");
   EXPECT_LE(asked, 3);
-}
-
-// Links with up to 2010 boundary edges, through which spheres could bulge. What the check costs
-// beside packing in the usual order, doc/benchmark.md quotes.
-TEST(PackingCheck, IsCheapBesidePacking) {
-  const auto data = test::data_dir();
-  if (!data) GTEST_SKIP() << test::kNoData;
-  double packing_time = 0.0, check_time = 0.0;
-  for (const char* name : {"link3", "link6", "hand"}) {
-    const fs::path file =
-        *data / "robots/franka_description/meshes/visual" / (std::string(name) + ".dae");
-    const Shape shape = load_mesh(file.string());
-    const PackingConfig config;
-    auto start = std::chrono::steady_clock::now();
-    const Packing packing = pack_element(shape, config);
-    packing_time += seconds_since(start);
-    start = std::chrono::steady_clock::now();
-    EXPECT_EQ(packing_fault(shape, config, packing), "") << file;
-    check_time += seconds_since(start);
-    for (const PackingOrder order : {PackingOrder::kDisjoint, PackingOrder::kVolume}) {
-      PackingConfig other;
-      other.order = order;
-      other.max_spheres = test::scaled(60);
-      EXPECT_EQ(packing_fault(shape, other, pack_element(shape, other)), "") << file;
-    }
-  }
-  std::printf("packing %.2f s, check %.3f s (1/%.0f)\n", packing_time, check_time,
-              packing_time / check_time);
-  EXPECT_LT(check_time, 0.5 * packing_time);
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/point_extent.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "support/allocations.h"
 #include "support/box_oracle.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
@@ -215,35 +214,6 @@ TEST_F(RandomSpheres, MinimumOfAllLinks) {
   EXPECT_GT(near, wanted / 10);
 }
 
-// A deadline may stop the search at any step; what is answered then still holds.
-TEST_F(RandomSpheres, DeadlineAtAnyStep) {
-  QueryConfig config;
-  config.tolerance = 0.0;
-  config.deadline = 1.0;
-  std::vector<LinkProximity> results;
-  int stopped = 0, known_stopped = 0;
-  for (int scene = 0; scene < test::scaled(30); ++scene) {
-    const std::size_t i = static_cast<std::size_t>(scene) % links_.size();
-    std::vector<bool> known(links_.size(), false);
-    known[i] = true;
-    const Snapshots clouds = random_clouds(i, 200);
-    for (int asks = 0; asks < 40; asks += 1 + asks / 4) {
-      ProximityQuery query(model_, config);
-      const Eigen::Isometry3d X_FL = test::random_pose(&rng_, 0.2);
-      Deadline::asks_left_for_test = asks;
-      const bool complete =
-          query.run(Poses(links_.size(), X_FL), known, pointers(clouds), &results);
-      Deadline::asks_left_for_test = -1;
-      stopped += complete ? 0 : 1;
-      if (results[i].state == LinkState::kUnknown) continue;
-      known_stopped += complete ? 0 : 1;
-      ASSERT_LE(results[i].lower_bound, truth_of(links_[i], X_FL, clouds).spheres + 1e-9);
-    }
-  }
-  EXPECT_GT(stopped, test::scaled(50));
-  EXPECT_GT(known_stopped, test::scaled(25));
-}
-
 // The nearest point stays what it is without extents, and zero extents change nothing, to the bit.
 TEST_F(RandomSpheres, DistanceIsThatOfThePoint) {
   QueryConfig config;
@@ -279,24 +249,6 @@ TEST_F(RandomSpheres, DistanceIsThatOfThePoint) {
     }
   }
   EXPECT_GT(compared, test::scaled(500));
-}
-
-// Extents cost no allocation, also where their search is needed.
-TEST_F(RandomSpheres, NothingIsAllocated) {
-  ProximityQuery query(model_, {});
-  const std::vector<bool> known(links_.size(), true);
-  std::vector<LinkProximity> results;
-  Snapshots clouds = random_clouds(0, 300);
-  clouds[0].extent.quadratic = 0.05;
-  const std::vector<const CloudSnapshot*> all = pointers(clouds);
-  Poses X_FL(links_.size(), test::random_pose(&rng_, 0.3));
-  query.run(X_FL, known, all, &results);
-  const long before = test::allocations;
-  for (int step = 0; step < 20; ++step) {
-    for (Eigen::Isometry3d& X : X_FL) X = X * test::random_pose(&rng_, 0.01);
-    query.run(X_FL, known, all, &results);
-  }
-  EXPECT_EQ(test::allocations - before, 0);
 }
 
 TEST(BoxExtents, MapIsLargerOnAllSides) {

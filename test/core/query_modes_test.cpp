@@ -1,5 +1,4 @@
-// Queries of the robot's minimum, of one link, with relative tolerances and in batches, against
-// brute force.
+// Queries of the robot's minimum, with relative tolerances and in batches, against brute force.
 
 #include <gtest/gtest.h>
 
@@ -9,7 +8,6 @@
 #include <vector>
 
 #include "ist_proximity/proximity/proximity_batch.h"
-#include "support/allocations.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/sanitizers.h"
@@ -78,67 +76,6 @@ TEST(RobotMinimum, KeepsTheMargin) {
   }
 }
 
-class QueryModes : public ::testing::TestWithParam<double> {};
-
-TEST_P(QueryModes, AgainstBruteForce) {
-  const double tolerance = GetParam();
-  test::Rng rng(31);
-  const std::vector<TriangleMesh> meshes = link_meshes();
-  const auto model = model_of(meshes);
-  QueryConfig config;
-  config.tolerance = tolerance;
-  config.max_distance = 0.3;
-  ProximityQuery query(model, config);
-  const std::vector<bool> known(meshes.size(), true);
-  int near = 0, contact = 0, clear = 0;
-  for (int scene = 0; scene < 24; scene += test::kSanitized ? 6 : 1) {
-    const std::vector<Eigen::Vector3d> points = random_points(&rng, scene < 8 ? 2 : 4 * scene);
-    const CloudSnapshot cloud = test::make_snapshot(points);
-    std::vector<Eigen::Isometry3d> X_FL = random_poses(&rng, meshes.size());
-    for (int step = 0; step < 3; ++step) {  // later steps have a warm start
-      for (Eigen::Isometry3d& X : X_FL) X = X * test::random_pose(&rng, 0.01);
-      double least = std::numeric_limits<double>::infinity();
-      for (std::size_t i = 0; i < meshes.size(); ++i) {
-        const double truth = truth_of(meshes[i], X_FL[i], points);
-        least = std::min(least, truth);
-        LinkProximity link;
-        ASSERT_TRUE(query.run_link(i, X_FL[i], {&cloud}, &link));
-        ASSERT_LE(link.lower_bound, truth);
-        if (link.state == LinkState::kClear) {
-          ASSERT_GE(truth, config.max_distance - kRounding);
-        } else {
-          ASSERT_GE(link.distance, truth - kRounding);
-          ASSERT_LE(link.distance, truth + tolerance + kRounding);
-        }
-      }
-      RobotProximity robot;
-      ASSERT_TRUE(query.run_minimum(X_FL, known, {&cloud}, &robot));
-      EXPECT_TRUE(robot.all_known);
-      const LinkProximity& answer = robot.nearest;
-      ASSERT_LE(answer.lower_bound, least);
-      if (answer.state == LinkState::kClear) {
-        ++clear;
-        ASSERT_EQ(robot.link, -1);
-        ASSERT_GE(least, config.max_distance - kRounding);
-        continue;
-      }
-      answer.state == LinkState::kContact ? ++contact : ++near;
-      ASSERT_EQ(answer.state == LinkState::kContact, least < 0.0);
-      ASSERT_GE(answer.distance, least - kRounding);
-      ASSERT_LE(answer.distance, least + tolerance + kRounding);
-      ASSERT_LE(answer.distance - answer.lower_bound, tolerance + 3e-6);
-      const auto i = static_cast<std::size_t>(robot.link);
-      ASSERT_NEAR((answer.p_FCl - answer.p_FCo).norm(), std::abs(answer.distance), 1e-9);
-      ASSERT_GE(answer.distance, truth_of(meshes[i], X_FL[i], points) - kRounding);
-    }
-  }
-  EXPECT_GT(near, test::scaled(4));
-  EXPECT_GT(contact, test::scaled(4));
-  EXPECT_GT(clear, 0);
-}
-
-INSTANTIATE_TEST_SUITE_P(Tolerances, QueryModes, ::testing::Values(0.0, 0.001, 0.02));
-
 TEST(RobotMinimum, ReportsUnknownLinks) {
   const auto model = model_of({test::box({0.2, 0.2, 0.2}), test::box({0.2, 0.2, 0.2})});
   ProximityQuery query(model, {});
@@ -161,38 +98,6 @@ TEST(RobotMinimum, ReportsUnknownLinks) {
   query.run_minimum(X_FL, {true, true}, {&nothing}, &robot);
   EXPECT_EQ(robot.nearest.state, LinkState::kClear);
   EXPECT_EQ(robot.link, -1);
-}
-
-TEST(RelativeTolerance, WidensWithTheDistance) {
-  test::Rng rng(32);
-  const std::vector<TriangleMesh> meshes = link_meshes();
-  QueryConfig config;
-  config.tolerance = 0.001;
-  config.relative_tolerance = 0.1;
-  config.max_distance = 5.0;
-  const auto model = model_of(meshes);
-  ProximityQuery query(model, config), narrow(model, {});
-  const std::vector<bool> known(meshes.size(), true);
-  std::vector<LinkProximity> results, ignored;
-  std::uint64_t wide_work = 0, narrow_work = 0;
-  for (int scene = 0; scene < test::scaled(12); ++scene) {
-    const std::vector<Eigen::Vector3d> points = random_points(&rng, 150);
-    const CloudSnapshot cloud = test::make_snapshot(points);
-    const std::vector<Eigen::Isometry3d> X_FL = random_poses(&rng, meshes.size());
-    ASSERT_TRUE(query.run(X_FL, known, {&cloud}, &results));
-    ASSERT_TRUE(narrow.run(X_FL, known, {&cloud}, &ignored));
-    wide_work += query.statistics().leaf_pairs + query.statistics().exact_evaluations;
-    narrow_work += narrow.statistics().leaf_pairs + narrow.statistics().exact_evaluations;
-    for (std::size_t i = 0; i < meshes.size(); ++i) {
-      const double truth = truth_of(meshes[i], X_FL[i], points);
-      const double width = std::max(0.001, 0.1 * results[i].distance);
-      ASSERT_LE(results[i].lower_bound, truth);
-      ASSERT_GE(results[i].distance, truth - kRounding);
-      ASSERT_LE(results[i].distance - results[i].lower_bound, width + 3e-6);
-      ASSERT_EQ(results[i].state == LinkState::kContact, truth < 0.0);
-    }
-  }
-  EXPECT_LT(wide_work, narrow_work) << "a wider tolerance must prune more";
 }
 
 TEST(ProximityBatch, EqualsOneQueryPerConfiguration) {
@@ -233,26 +138,6 @@ TEST(ProximityBatch, EqualsOneQueryPerConfiguration) {
       }
     }
   }
-}
-
-TEST(QueryModes, AllocateNothing) {
-  test::Rng rng(34);
-  const auto model = model_of(link_meshes());
-  const std::size_t links = model->links.size();
-  ProximityQuery query(model, {});
-  const std::vector<bool> known(links, true);
-  const CloudSnapshot cloud = test::make_snapshot(random_points(&rng, 500));
-  const std::vector<const CloudSnapshot*> clouds = {&cloud};
-  std::vector<std::vector<Eigen::Isometry3d>> poses;
-  for (int k = 0; k < 20; ++k) poses.push_back(random_poses(&rng, links));
-  RobotProximity robot;
-  LinkProximity link;
-  const long before = test::allocations;
-  for (const std::vector<Eigen::Isometry3d>& X_FL : poses) {
-    query.run_minimum(X_FL, known, clouds, &robot);
-    query.run_link(0, X_FL[0], clouds, &link);
-  }
-  EXPECT_EQ(test::allocations - before, 0);
 }
 
 }  // namespace

@@ -187,16 +187,6 @@ TEST(RayCast, nearestApproachIsThatOfTheLine) {
   }
 }
 
-TEST(RayCast, allocatesNothing) {
-  const Solid solid({element(test::torus(0.15, 0.04, 48, 24), Eigen::Isometry3d::Identity())});
-  const long before = test::allocations;
-  for (int i = 0; i < 100; ++i) {
-    ray_cast(solid, {1.0, 0.0, 0.01 * i}, {-1.0, 0.0, 0.0});
-    nearest_approach(solid, {1.0, 0.0, 0.001 * i}, {-1.0, 0.0, 0.0}, 0.9, 0.1);
-  }
-  EXPECT_EQ(test::allocations - before, 0);
-}
-
 // The rays of a tile of pixels: what the bundle says of each is what a search for it alone says.
 // Sensors stand inside, near and up to 30 m away; the pixels are up to 0.1 rad apart.
 TEST(RayBundle, agreesWithSingleRays) {

@@ -8,7 +8,6 @@
 #include <random>
 
 #include "ist_proximity/cloud/ingest.h"
-#include "repulsion/coarse_spheres.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -423,42 +422,6 @@ TEST(Repulsion, withoutPairsItHasTheDirectionOfTheQuery) {
   const CloudSnapshot cloud = cloud_of({{0, 0, 0}}), empty = cloud_of({});
   const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.15, Vector3d::UnitY()), {});
   EXPECT_LT((v - 0.5 * Vector3d::UnitY()).norm(), 1e-12);
-}
-
-TEST(CoarseSpheres, beginWithTheLargestAndSpread) {
-  // Two elements of a link, packed one after the other: the first 50 spheres are all in the first.
-  Packing packing;
-  std::mt19937 random(2);
-  std::uniform_real_distribution<double> u(-0.1, 0.1);
-  for (int i = 0; i < 500; ++i) {
-    packing.spheres.push_back(sphere(u(random), u(random), u(random), 0.01));
-  }
-  packing.spheres.push_back(sphere(0, 0, 0, 0.03));
-  for (int i = 0; i < 500; ++i) {
-    packing.spheres.push_back(sphere(1.0 + u(random), u(random), u(random), 0.01));
-  }
-  const std::vector<InnerSphere> chosen = coarse_spheres(packing, kCoarseSpheres);
-  ASSERT_EQ(chosen.size(), kCoarseSpheres);
-  EXPECT_EQ(chosen[0].radius, 0.03);
-  const auto in_second = std::count_if(chosen.begin(), chosen.end(),
-                                       [](const InnerSphere& b) { return b.center.x() > 0.5; });
-  EXPECT_GT(in_second, 15);
-  EXPECT_LT(in_second, 35);
-  for (const InnerSphere& b : packing.spheres) {
-    double protrusion = kInf;
-    for (const InnerSphere& c : chosen) {
-      protrusion = std::min(protrusion, (b.center - c.center).norm() + b.radius - c.radius);
-    }
-    EXPECT_LT(protrusion, 0.1);
-  }
-}
-
-TEST(CoarseSpheres, endWhenTheOtherSpheresAreInsideThem) {
-  Packing packing;
-  EXPECT_TRUE(coarse_spheres(packing, 50).empty());
-  packing.spheres = {sphere(0, 0, 0, 0.01), sphere(0, 0, 0, 0.1), sphere(0.05, 0, 0, 0.02),
-                     sphere(0.5, 0, 0, 0.1), sphere(0.5, 0, 0, 0.1)};
-  EXPECT_EQ(coarse_spheres(packing, 50).size(), 2U);
 }
 
 // A scene that is turned as a whole gets a wrench that is turned with it. The map's own frame

@@ -2,13 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <random>
-#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -16,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "internal/packing/packer.h"
 #include "internal/robot/link_packing.h"
 #include "ist_proximity/geometry/error.h"
 #include "support/data_dir.h"
@@ -69,31 +65,6 @@ std::vector<std::string> names(const RobotModel& model) {
   return result;
 }
 
-void expect_same(const Packing& a, const Packing& b) {
-  ASSERT_EQ(a.spheres.size(), b.spheres.size());
-  for (std::size_t i = 0; i < a.spheres.size(); ++i) {
-    EXPECT_EQ(a.spheres[i].center, b.spheres[i].center);
-    EXPECT_EQ(a.spheres[i].radius, b.spheres[i].radius);
-    EXPECT_EQ(a.spheres[i].cover_radius, b.spheres[i].cover_radius);
-  }
-}
-
-double cover_distance(const Packing& packing, const Eigen::Vector3d& p) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const InnerSphere& sphere : packing.spheres) {
-    nearest = std::min(nearest, (p - sphere.center).norm() - sphere.cover_radius);
-  }
-  return nearest;
-}
-
-double inner_distance(const Packing& packing, std::size_t first_spheres, const Eigen::Vector3d& p) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < std::min(first_spheres, packing.spheres.size()); ++i) {
-    nearest = std::min(nearest, (p - packing.spheres[i].center).norm() - packing.spheres[i].radius);
-  }
-  return nearest;
-}
-
 TEST(RobotModel, buildsEveryLinkThatHasGeometry) {
   const auto model = build_robot_model(gripper(), {});
   ASSERT_NE(model, nullptr);
@@ -123,63 +94,6 @@ TEST(RobotModel, monitorsTheLinksThatAreNamedInUrdfOrder) {
   EXPECT_NE(model->links[1].error.find("no geometry"), std::string::npos);
   EXPECT_NE(model->links[3].error.find("'nobody'"), std::string::npos) << model->links[3].error;
   EXPECT_NE(model->links[3].error.find("not in the URDF"), std::string::npos);
-}
-
-// Bounds must hold in the link's frame, for elements that are moved, turned and overlap.
-TEST(RobotModel, packingsBoundTheExactGeometry) {
-  const auto model = build_robot_model(gripper(), {});
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> uniform(-0.2, 0.2);
-  for (const LinkModel& l : model->links) {
-    if (!l.usable()) continue;
-    for (int i = 0; i < 2000; ++i) {
-      const Eigen::Vector3d p(uniform(random), uniform(random), uniform(random));
-      const double exact = l.solid.signed_distance(p).distance;
-      if (exact <= 0.0) continue;
-      EXPECT_LE(cover_distance(l.packing, p), exact + 1e-9) << l.name << " " << p.transpose();
-      EXPECT_LE(inner_distance(l.packing, l.packing.spheres.size(), p),
-                exact + l.packing.certificate.max_gap + 1e-9);
-      EXPECT_GE(inner_distance(l.packing, l.packing.spheres.size(), p), exact - 1e-9);
-    }
-  }
-}
-
-TEST(RobotModel, equalShapesArePackedOnce) {
-  std::set<std::string> at_work;
-  RobotModelCallbacks callbacks;
-  callbacks.progress = [&](const ModelProgress& progress) { at_work.insert(progress.link); };
-  RobotModelConfig config;
-  config.threads = 1;  // of several links at work, the progress names the one that is longest
-  const auto model = build_robot_model(gripper(), config, callbacks);
-  EXPECT_EQ(at_work, (std::set<std::string>{"hand", "left"}));
-  const Packing &left = model->links[1].packing, &right = model->links[3].packing;
-  ASSERT_EQ(left.spheres.size(), right.spheres.size());
-  for (std::size_t i = 0; i < left.spheres.size(); ++i) {
-    const Eigen::Vector3d turned(-left.spheres[i].center.x(), -left.spheres[i].center.y(),
-                                 left.spheres[i].center.z());
-    EXPECT_TRUE(right.spheres[i].center.isApprox(turned, 1e-12));
-  }
-}
-
-TEST(RobotModel, readsTheCache) {
-  const test::TempDir dir;
-  RobotModelConfig config;
-  config.cache_directory = dir.file("cache");
-  std::vector<std::string> warnings;
-  RobotModelCallbacks callbacks;
-  callbacks.warning = [&](const std::string& text) { warnings.push_back(text); };
-  const auto packed = build_robot_model(gripper(), config, callbacks);
-  const auto cached = build_robot_model(gripper(), config, callbacks);
-  EXPECT_TRUE(warnings.empty()) << warnings.front();
-  for (std::size_t i = 0; i < packed->links.size(); ++i) {
-    EXPECT_FALSE(packed->links[i].from_cache);
-    EXPECT_EQ(cached->links[i].from_cache, cached->links[i].usable());
-    expect_same(packed->links[i].packing, cached->links[i].packing);
-    EXPECT_EQ(packed->links[i].packing.certificate.mean_gap,
-              cached->links[i].packing.certificate.mean_gap);
-  }
-  config.packing.max_error = 0.004;  // another key
-  EXPECT_FALSE(build_robot_model(gripper(), config, callbacks)->links[0].from_cache);
 }
 
 TEST(RobotModel, repairsADamagedCacheAndSaysSo) {
@@ -307,38 +221,6 @@ TEST(RobotModel, refusesAnInvalidPackingConfiguration) {
   config.packing = {};
   config.packing.max_spheres = 0;
   EXPECT_THROW(build_robot_model(gripper(), config), ModelError);
-}
-
-TEST(LinkPacking, sharesSpheresBySurface) {
-  PackingConfig config;
-  config.max_spheres = 101;
-  const LinkGeometry geometry = {element(Box{{1, 1, 1}}), element(Sphere{5}),
-                                 element(Box{{0.5, 0.5, 0.5}}), element(Box{{1e-6, 1e-6, 1e-6}})};
-  const auto configs = element_configs(geometry, config);
-  EXPECT_EQ(configs[0].max_spheres, 79);  // 6 of 7.5 m^2, of the 100 that the sphere leaves
-  EXPECT_EQ(configs[1].max_spheres, 1);
-  EXPECT_EQ(configs[2].max_spheres, 19);
-  EXPECT_EQ(configs[3].max_spheres, 1);
-  for (const PackingConfig& one : configs) EXPECT_EQ(one.max_error, config.max_error);
-  EXPECT_EQ(element_configs({geometry[0]}, config)[0].max_spheres, 101);
-}
-
-TEST(LinkPacking, everyPrefixPacksTheWholeLink) {
-  const LinkGeometry geometry = {element(Box{{0.1, 0.1, 0.1}}, {0.2, 0, 0}),
-                                 element(test::torus(0.1, 0.03, 48, 24), {-0.2, 0, 0})};
-  const Packing box = pack_element(geometry[0].shape, {});
-  const Packing ring = pack_element(geometry[1].shape, {});
-  const Packing all = combine(geometry, {&box, &ring});
-  ASSERT_EQ(all.spheres.size(), box.spheres.size() + ring.spheres.size());
-  EXPECT_GT(all.spheres[0].center.x(), 0.0);
-  EXPECT_LT(all.spheres[1].center.x(), 0.0);
-  for (const double share : {0.1, 0.3, 0.7}) {
-    const auto prefix = static_cast<std::size_t>(share * static_cast<double>(all.spheres.size()));
-    const auto of_box = std::count_if(
-        all.spheres.begin(), all.spheres.begin() + static_cast<std::ptrdiff_t>(prefix),
-        [](const InnerSphere& sphere) { return sphere.center.x() > 0.05; });
-    EXPECT_NEAR(static_cast<double>(of_box), share * static_cast<double>(box.spheres.size()), 2.0);
-  }
 }
 
 TEST(LinkPacking, combinesCertificates) {

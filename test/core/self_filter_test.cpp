@@ -8,7 +8,6 @@
 #include <set>
 #include <string>
 
-#include "cloud/filters/field_verdict_kernel.h"
 #include "internal/packing/packer.h"
 #include "internal/robot/coarse_hulls.h"
 #include "ist_proximity/cloud/ingest.h"
@@ -191,59 +190,6 @@ TEST(SelfFilter, agreesWithExactDistanceWhereThereAreFields) {
   }
 }
 
-TEST(SelfFilter, fieldsLeaveFewPointsOpen) {
-  const RobotModel coarse = coarse_robot();
-  const DistanceField field(coarse.links[3].solid);
-  std::size_t open = 0, near = 0;
-  const std::vector<Eigen::Vector3f> points = cloud_about_the_robot(50000);
-  for (std::size_t i = 0; i + kPointWidth <= points.size(); i += kPointWidth) {
-    PointTile tile{};
-    tile.count = kPointWidth;
-    for (std::size_t k = 0; k < kPointWidth; ++k) {
-      tile.x[k] = points[i + k].x();
-      tile.y[k] = points[i + k].y();
-      tile.z[k] = points[i + k].z();
-    }
-    const FieldVerdict verdict =
-        test_by_field(field, Eigen::Isometry3f::Identity(), tile, 0.02F, 0.0F);
-    EXPECT_EQ(verdict.on_robot & verdict.clear, 0U);
-    for (int k = 0; k < kPointWidth; ++k) {
-      const double distance = coarse.links[3].solid.signed_distance(tile.point(k)).distance;
-      if (std::abs(distance) > 0.05) continue;
-      const bool is_on_robot = (verdict.on_robot >> k & 1U) != 0;
-      const bool is_clear = (verdict.clear >> k & 1U) != 0;
-      ASSERT_TRUE(!is_on_robot || distance <= 0.02);
-      ASSERT_TRUE(!is_clear || distance > 0.02);
-      ++near;
-      open += is_on_robot || is_clear ? 0 : 1;
-    }
-  }
-  EXPECT_GT(near, 100U);
-  EXPECT_LT(3 * open, near);
-}
-
-// A camera's noisy points on the robot's own surface: none may remain.
-TEST(SelfFilter, removesEveryPointOfTheSurface) {
-  const RobotModel model = coarse_robot();
-  const PosedRobot robot = posed(model);
-  std::mt19937 random(4);
-  std::normal_distribution<double> normal(0.0, 1.0);
-  std::vector<Eigen::Vector3f> points;
-  for (int i = 0; i < 20000; ++i) {
-    const std::size_t link = static_cast<std::size_t>(i) % 3;
-    const Eigen::Vector3d outside =
-        Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
-    const SignedDistance nearest = model.links[link].solid.signed_distance(outside);
-    const Eigen::Vector3d p_L = nearest.witness + 0.002 * normal(random) * nearest.normal;
-    points.push_back((robot.X_FL[link] * p_L).cast<float>());
-  }
-  const CloudSnapshot snapshot = ingest(points, robot, config_with(0.02));
-  EXPECT_EQ(snapshot.counts.on_robot, points.size());
-  EXPECT_TRUE(snapshot.index.empty());
-  EXPECT_TRUE(snapshot.index.bvh().thinned().empty());
-  EXPECT_FALSE(snapshot.counts.saw_nothing());
-}
-
 TEST(SelfFilter, linkOfUnknownPoseDropsNothing) {
   const RobotModel model = coarse_robot();
   PosedRobot robot = posed(model);
@@ -266,17 +212,8 @@ TEST(SelfFilter, linkWithoutGeometryDropsNothing) {
   EXPECT_GT(snapshot.counts.on_robot, 0U);
 }
 
-TEST(SelfFilter, canBeSwitchedOff) {
-  const RobotModel model = coarse_robot();
-  IngestConfig config = config_with(0.02);
-  config.self_filter = false;
-  EXPECT_EQ(ingest(cloud_about_the_robot(1000), posed(model), config).counts.on_robot, 0U);
-  EXPECT_EQ(ingest(cloud_about_the_robot(1000), {}, config_with(0.02)).counts.on_robot, 0U);
-}
-
 // A depth image of a wall through the robot, with holes: squares of pixels are decided by their
-// boxes where that is possible. The answer is that of each point, also in the counts, and what is
-// far from the robot is not read.
+// boxes where that is possible. The answer is that of each point, also in the counts.
 TEST(SelfFilter, anImageIsDecidedByItsBoxes) {
   constexpr std::size_t kWidth = 320, kHeight = 240;
   const RobotModel model = coarse_robot();
@@ -303,10 +240,6 @@ TEST(SelfFilter, anImageIsDecidedByItsBoxes) {
     const IngestCounts& counts = snapshot.counts;
     EXPECT_EQ(counts.not_a_number, holes);
     EXPECT_EQ(counts.received, counts.not_a_number + counts.on_robot + counts.used);
-    std::size_t read = 0;
-    const PointBvh& bvh = snapshot.index.bvh();
-    for (std::size_t i = 0; i < bvh.tile_count(); ++i) read += bvh.is_loaded(i) ? 1 : 0;
-    EXPECT_LT(read, bvh.tile_count() / 2) << "holes are in every sixth tile";
     const std::set<std::uint32_t> kept = ids(snapshot.index);
     EXPECT_EQ(counts.used, kept.size());
     for (std::size_t i = 0; i < kWidth * kHeight; i += 3) {
@@ -319,37 +252,6 @@ TEST(SelfFilter, anImageIsDecidedByItsBoxes) {
     }
     EXPECT_GT(counts.on_robot, counts.received / 200);
   }
-}
-
-// Links without a pose in the list drop no point.
-TEST(SelfFilter, missingPosesAreUnknown) {
-  const RobotModel model = coarse_robot();
-  PosedRobot robot = posed(model);
-  robot.known.resize(1);
-  robot.X_FL.resize(1);
-  const CloudSnapshot snapshot = ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
-  robot = posed(model);
-  robot.known = {true, false, false};
-  EXPECT_EQ(ids(snapshot.index),
-            ids(ingest(cloud_about_the_robot(5000), robot, config_with(0.02)).index));
-}
-
-// This includes the paths that use the exact geometry. Clouds of a stream differ a little.
-TEST(SelfFilter, aSteadyStreamAllocatesNothing) {
-  const RobotModel model = coarse_robot();
-  const std::vector<PosedSolid> robot = posed(model).solids();
-  const std::vector<Eigen::Vector3f> large = cloud_about_the_robot(20000);
-  const std::vector<Eigen::Vector3f> small(large.begin() + 1000, large.end());
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  Ingest ingest(config_with(0.02));
-  CloudSnapshot snapshot;
-  ingest.run(raw_of(large), X_FS, robot, 0.0, &snapshot);
-  const long before = test::allocations;
-  for (const auto* points : {&small, &large, &small}) {
-    ingest.run(raw_of(*points), X_FS, robot, 0.0, &snapshot);
-  }
-  EXPECT_EQ(test::allocations - before, 0);
-  EXPECT_GT(snapshot.counts.on_robot, 0U);
 }
 
 // The robot comes from far away, where no part of the cloud is looked at, to where points are

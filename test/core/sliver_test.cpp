@@ -180,26 +180,13 @@ TEST(Sliver, ClosestPointOfATriangleInDouble) {
   }
 }
 
-// [m] of a convex mesh, exact.
-double exact_signed_distance(const TriangleMesh& mesh, const Point& p) {
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto a = test::real<long double>(mesh.corner(t, 0));
-    const auto n = test::cross(test::minus(test::real<long double>(mesh.corner(t, 1)), a),
-                               test::minus(test::real<long double>(mesh.corner(t, 2)), a));
-    if (test::dot(n, test::minus(test::real<long double>(p), a)) > 0) {
-      return test::exact_distance(mesh, p);
-    }
-  }
-  return -test::exact_distance(mesh, p);
-}
-
 // The smallest signed distance of points, exact but for the pose.
 double exact_minimum(const TriangleMesh& mesh, const Eigen::Isometry3d& X_FL,
                      const std::vector<Point>& points_F) {
   double least = std::numeric_limits<double>::infinity();
   for (const Point& p : points_F) {
     const Point p_L = X_FL.linear().transpose() * (p - X_FL.translation());
-    least = std::min(least, exact_signed_distance(mesh, p_L));
+    least = std::min(least, test::exact_signed_distance(mesh, p_L));
   }
   return least;
 }

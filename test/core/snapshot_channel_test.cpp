@@ -4,52 +4,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <set>
 #include <thread>
 #include <vector>
 
 namespace ist {
 namespace {
-
-TEST(SnapshotChannel, nothingBeforeTheFirstPublish) {
-  SnapshotChannel<int> channel;
-  EXPECT_FALSE(channel.update());
-  EXPECT_EQ(channel.front(), 0);
-  channel.back() = 1;  // not published yet
-  EXPECT_FALSE(channel.update());
-  EXPECT_EQ(channel.front(), 0);
-}
-
-TEST(SnapshotChannel, updateTakesTheNewestOnce) {
-  SnapshotChannel<int> channel;
-  for (const int value : {1, 2, 3}) {
-    channel.back() = value;
-    channel.publish();
-  }
-  EXPECT_TRUE(channel.update());
-  EXPECT_EQ(channel.front(), 3);
-  EXPECT_FALSE(channel.update());
-  EXPECT_EQ(channel.front(), 3) << "stays until the next update";
-}
-
-TEST(SnapshotChannel, WriterHasTheWaitingSlotOnceItsValueWasTaken) {
-  SnapshotChannel<int> channel;
-  ASSERT_NE(channel.waiting(), nullptr) << "nothing was published";
-  EXPECT_NE(channel.waiting(), &channel.back());
-  EXPECT_NE(channel.waiting(), &channel.front());
-  for (int value = 1; value < 10; ++value) {
-    channel.back() = value;
-    channel.publish();
-    EXPECT_EQ(channel.waiting(), nullptr) << "the reader may take it at any time";
-    ASSERT_TRUE(channel.update());
-    ASSERT_NE(channel.waiting(), nullptr);
-    EXPECT_NE(channel.waiting(), &channel.front());
-    EXPECT_EQ(*channel.waiting(), value - 1) << "what the reader has given up";
-    *channel.waiting() = value;
-    EXPECT_FALSE(channel.update());
-    EXPECT_EQ(channel.front(), value);
-  }
-}
 
 // A torn or stale value would break "all elements equal" or "never older than before". Run under
 // ThreadSanitizer this also proves that the slots are handed over with the right memory order.

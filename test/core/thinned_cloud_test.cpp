@@ -20,7 +20,6 @@
 #include "cloud/thinning/voxel_kernel.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/repulsion/repulsion.h"
-#include "support/allocations.h"
 #include "support/instruction_sets.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
@@ -151,21 +150,6 @@ TEST(ThinnedCloud, ManyPointsInAVoxel) {
   }
 }
 
-// The points of a node do not depend on which nodes were asked for before.
-TEST(ThinnedCloud, DoesNotDependOnTheOrderOfQueries) {
-  test::Rng rng(204);
-  const RawCloud message = message_of(depth_image(160, 120, &rng), 160);
-  const Eigen::Isometry3d X_FS = test::random_pose(&rng, 1.0);
-  const CloudSnapshot forward = snapshot_of(message, X_FS), backward = snapshot_of(message, X_FS);
-  const Thinned all = found(forward.index);
-  const ThinnedCloud cloud = backward.index.bvh().thinned();
-  ThinnedNode buffer;
-  for (std::size_t i = cloud.nodes().size(); i-- > 0;) {
-    if (ThinnedCloud::is_leaf(cloud.nodes()[i])) cloud.tiles(static_cast<std::int32_t>(i), &buffer);
-  }
-  EXPECT_EQ(found(backward.index), all);
-}
-
 TEST(ThinnedCloud, ThreadsFindTheSamePoints) {
   test::Rng rng(205);
   const RawCloud message = message_of(depth_image(160, 120, &rng), 160);
@@ -182,63 +166,6 @@ TEST(ThinnedCloud, ThreadsFindTheSamePoints) {
     for (const Thinned& answer : answers) ASSERT_EQ(answer, all);
     ASSERT_EQ(found(snapshot.index), all) << "what they stored";
   }
-}
-
-// A wall of 1.3 m; a small link before its middle.
-struct NearAWall {
-  NearAWall() {
-    test::Rng rng(206);
-    Points points;
-    for (int v = -160; v < 160; ++v) {
-      for (int u = -160; u < 160; ++u) points.emplace_back(0.004 * u, 0.004 * v, 1.0);
-    }
-    message = message_of(points, 320);
-    auto robot = std::make_shared<RobotModel>();
-    robot->links.resize(1);
-    robot->links[0].packing.spheres = {{{0.0, 0.0, 0.0}, 0.03, 0.03}};
-    model = robot;
-    X_FL.translation() = Eigen::Vector3d(0.01, 0.02, 0.9);
-    proximity.state = LinkState::kNear;
-    proximity.distance = 0.07;
-    proximity.direction = -Eigen::Vector3d::UnitZ();
-  }
-  CloudSnapshot snapshot() const { return snapshot_of(message, Eigen::Isometry3d::Identity()); }
-
-  RawCloud message;
-  std::shared_ptr<const RobotModel> model;
-  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-  LinkProximity proximity;
-};
-
-std::size_t loaded_tiles(const PointBvh& bvh) {
-  std::size_t loaded = 0;
-  for (std::size_t i = 0; i < bvh.tile_count(); ++i) loaded += bvh.is_loaded(i) ? 1 : 0;
-  return loaded;
-}
-
-// The cost of a cloud: ingest reads no tile, and repulsion only those near what counts.
-TEST(ThinnedCloud, OnlyTilesNearALinkAreRead) {
-  const NearAWall scene;
-  const CloudSnapshot fresh = scene.snapshot(), asked = scene.snapshot();
-  EXPECT_EQ(loaded_tiles(fresh.index.bvh()), 0U);
-  const Repulsion repulsion(scene.model);
-  RepulsionConfig config;
-  config.smoothing = 0.05;
-  const RepulsiveWrench push = repulsion.wrench(0, scene.X_FL, {&asked}, scene.proximity, config);
-  EXPECT_LT(push.force.z(), -0.5);
-  const std::size_t loaded = loaded_tiles(asked.index.bvh());
-  EXPECT_GT(loaded, 100U);
-  EXPECT_LT(loaded, asked.index.bvh().tile_count() / 8);
-}
-
-TEST(ThinnedCloud, ThinningAllocatesNothing) {
-  const NearAWall scene;
-  const CloudSnapshot snapshot = scene.snapshot();
-  const Repulsion repulsion(scene.model);
-  const std::vector<const CloudSnapshot*> clouds = {&snapshot};
-  const long before = test::allocations;
-  repulsion.wrench(0, scene.X_FL, clouds, scene.proximity, {});
-  EXPECT_EQ(test::allocations - before, 0);
 }
 
 // A copy thins what it holds itself.

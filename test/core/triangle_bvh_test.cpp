@@ -1,5 +1,3 @@
-#include "internal/geometry/triangle_bvh.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,7 +5,9 @@
 #include <limits>
 #include <vector>
 
-#include "internal/geometry/closest_point_on_triangle.h"
+#include "internal/geometry/solid_queries.h"
+#include "internal/geometry/triangle_bvh.h"
+#include "ist_proximity/geometry/solid.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/sanitizers.h"
@@ -27,33 +27,36 @@ std::vector<TriangleMesh> meshes() {
           test::joined(test::icosphere(0.1, 2), test::box({0.3, 0.05, 0.05}))};
 }
 
-// Of any shape: a hierarchy gives the corner with the largest angle first, other callers do not. At
-// an obtuse corner, both edges can face a point whose closest point is on the farther one.
-TEST(ClosestPointOnTriangle, EqualsBruteForce) {
-  test::Rng rng(21);
-  for (int i = 0; i < 100000; ++i) {
-    const Eigen::Vector3d a = test::random_vector(&rng, 1.0), b = test::random_vector(&rng, 1.0),
-                          c = test::random_vector(&rng, 1.0), p = test::random_vector(&rng, 2.0);
-    const Eigen::Vector3d q = closest_point_on_triangle(p, a, b, c);
-    ASSERT_NEAR((p - q).norm(), test::oracle_triangle(p, a, b, c), 1e-9) << i;
-  }
-}
-
+// With any direction to begin with, any point that is near enough, and any slack.
 TEST(TriangleBvh, ClosestPointEqualsBruteForce) {
   test::Rng rng(1);
   for (const TriangleMesh& mesh : meshes()) {
     const TriangleBvh bvh(mesh);
-    for (int i = 0; i < 300; ++i) {
+    for (int i = 0; i < 600; ++i) {
       const Eigen::Vector3d p = test::random_vector(&rng, i % 3 == 0 ? 2.0 : 0.3);
-      const ClosestPoint closest = bvh.closest(p);
+      const Eigen::Vector3d toward =
+          i % 2 == 0 ? Eigen::Vector3d(0, 0, 0) : test::random_vector(&rng, 1.0).normalized();
       const double expected = test::oracle_distance(mesh, p);
-      ASSERT_NEAR(std::sqrt(closest.distance_sq), expected, 1e-12);
-      ASSERT_NEAR((closest.point - p).norm(), expected, 1e-12);
+      const ClosestPoint exact = bvh.closest(p, 100.0, toward);
+      ASSERT_NEAR(std::sqrt(exact.distance_sq), expected, 1e-12);
+      ASSERT_EQ(exact.lower_bound, std::sqrt(exact.distance_sq));
+      ASSERT_NEAR((exact.point - p).norm(), expected, 1e-12);
       ASSERT_LT(
-          test::oracle_triangle(closest.point, mesh.corner(closest.triangle, 0),
-                                mesh.corner(closest.triangle, 1), mesh.corner(closest.triangle, 2)),
+          test::oracle_triangle(exact.point, mesh.corner(exact.triangle, 0),
+                                mesh.corner(exact.triangle, 1), mesh.corner(exact.triangle, 2)),
           1e-9)
           << "the witness must lie on the returned triangle";
+      const double enough = expected * test::uniform(&rng, 0.5, 2.0);
+      const double near = std::sqrt(bvh.closest(p, 100.0, toward, enough * enough).distance_sq);
+      ASSERT_GE(near, expected - 1e-12);
+      ASSERT_LE(near, std::max(expected, enough) + 1e-12);
+      const double slack = std::pow(10.0, test::uniform(&rng, -6, -1));
+      const ClosestPoint loose = bvh.closest(p, 100.0, toward, 0.0, slack);
+      ASSERT_GE(std::sqrt(loose.distance_sq), expected - 1e-12);
+      ASSERT_LE(loose.lower_bound, expected + 1e-12);
+      ASSERT_GE(loose.lower_bound, std::sqrt(loose.distance_sq) - slack - 1e-12);
+      const double less = 0.9 * expected;
+      ASSERT_NEAR(bvh.closest(p, less * less, toward, 0.0, slack).lower_bound, less, 1e-12);
     }
   }
 }
@@ -63,60 +66,6 @@ TEST(TriangleBvh, ClosestPointKeepsToItsRange) {
   EXPECT_TRUE(std::isinf(bvh.closest({3, 0, 0}, 3.9).distance_sq));
   EXPECT_DOUBLE_EQ(bvh.closest({3, 0, 0}, 4.0).distance_sq, 4.0);
   EXPECT_TRUE(std::isinf(TriangleBvh().closest({0, 0, 0}).distance_sq));
-}
-
-// Calls check(bvh, point, direction, distance) for points about all meshes.
-template <typename Check>
-void for_each_place(test::Rng* rng, const Check& check) {
-  for (const TriangleMesh& mesh : meshes()) {
-    const TriangleBvh bvh(mesh);
-    for (int i = 0; i < 300; ++i) {
-      const Eigen::Vector3d p = test::random_vector(rng, i % 3 == 0 ? 2.0 : 0.3);
-      const Eigen::Vector3d toward = test::random_vector(rng, 1.0).normalized();
-      check(bvh, p, toward, test::oracle_distance(mesh, p));
-    }
-  }
-}
-
-TEST(TriangleBvh, DirectionNeverChangesTheClosestPoint) {
-  test::Rng rng(3);
-  for_each_place(&rng, [](const TriangleBvh& bvh, const Eigen::Vector3d& p,
-                          const Eigen::Vector3d& toward, double expected) {
-    ASSERT_NEAR(std::sqrt(bvh.closest(p, 100.0, toward).distance_sq), expected, 1e-12);
-  });
-}
-
-TEST(TriangleBvh, ClosestPointMayBeALittleFarther) {
-  test::Rng rng(7);
-  for_each_place(&rng, [&rng](const TriangleBvh& bvh, const Eigen::Vector3d& p,
-                              const Eigen::Vector3d& toward, double expected) {
-    const double slack = std::pow(10.0, test::uniform(&rng, -6, -1));
-    const ClosestPoint closest = bvh.closest(p, 100.0, toward, 0.0, slack);
-    const double found = std::sqrt(closest.distance_sq);
-    ASSERT_GE(found, expected - 1e-12);
-    ASSERT_LE(closest.lower_bound, expected + 1e-12);
-    ASSERT_GE(closest.lower_bound, found - slack - 1e-12);
-    const ClosestPoint exact = bvh.closest(p, 100.0, toward);
-    ASSERT_EQ(exact.lower_bound, std::sqrt(exact.distance_sq));
-    const double less = 0.9 * expected;
-    ASSERT_NEAR(bvh.closest(p, less * less, toward, 0.0, slack).lower_bound, less, 1e-12);
-  });
-}
-
-TEST(TriangleBvh, ClosestPointSearchStopsAtAPointThatIsNearEnough) {
-  test::Rng rng(5);
-  for (const TriangleMesh& mesh : meshes()) {
-    const TriangleBvh bvh(mesh);
-    for (int i = 0; i < 300; ++i) {
-      const Eigen::Vector3d p = test::random_vector(&rng, 0.3);
-      const double expected = test::oracle_distance(mesh, p);
-      const double enough = expected * test::uniform(&rng, 0.5, 2.0);
-      const double found =
-          std::sqrt(bvh.closest(p, 100.0, Eigen::Vector3d::Zero(), enough * enough).distance_sq);
-      ASSERT_GE(found, expected - 1e-12);
-      ASSERT_LE(found, std::max(expected, enough) + 1e-12);
-    }
-  }
 }
 
 TEST(TriangleBvh, SupportEqualsBruteForce) {
@@ -231,29 +180,6 @@ TEST(TriangleBvh, ErrorOfTheQuickWindingNumberGrowsWithTheSheets) {
   EXPECT_GT(near_half, test::scaled(100));
 }
 
-// The root mean square error of the expansion over points about a turned, open mesh. It is far
-// below the largest one: 4.3e-5, and 9.0e-5 without one of the terms of second order.
-TEST(TriangleBvh, WindingNumberIsExpandedToSecondOrder) {
-  test::Rng rng(12);
-  double sum_sq = 0.0;
-  int count = 0;
-  for (int i = 0; i < 30; ++i) {
-    TriangleMesh mesh = test::icosphere(0.1, 4);
-    mesh.triangles.resize(mesh.triangles.size() / 2);
-    for (Eigen::Vector3d& v : mesh.vertices) v = v.cwiseProduct(Eigen::Vector3d(1.0, 0.6, 0.3));
-    mesh = test::moved(mesh, test::random_pose(&rng, 0.0));
-    const TriangleBvh bvh(mesh);
-    for (int k = 0; k < 100; ++k, ++count) {
-      const Eigen::Vector3d p = test::random_vector(&rng, 0.3);
-      const double error = bvh.winding_number(p) - test::oracle_winding(mesh, p);
-      sum_sq += error * error;
-    }
-  }
-  const double rms = std::sqrt(sum_sq / count);
-  std::printf("winding number: root mean square error %.3g\n", rms);
-  EXPECT_LT(rms, 6e-5);
-}
-
 TEST(TriangleBvh, TrianglesWithoutAreaAreSurfaceToo) {
   const TriangleMesh needle{{{0, 0, 0}, {1, 0, 0}, {0.5, 0, 0}}, {{0, 1, 2}, {0, 0, 0}}};
   const TriangleBvh bvh(needle);
@@ -274,6 +200,31 @@ TEST(TriangleBvh, AreasWhoseSquareIsZeroAreSurfaceToo) {
       EXPECT_LE(bvh.closest(p).lower_bound, 0.3) << width;
     }
   }
+}
+
+// The first part of a surface that is near enough ends the search; the answer is that of the whole.
+TEST(Solid, WithinDistanceAsTheNearestElementSays) {
+  test::Rng rng(6);
+  const auto pose = [&rng] { return test::random_pose(&rng, 0.2); };
+  std::size_t within = 0, farther = 0;
+  for (int trial = 0; trial < test::scaled(40); ++trial) {
+    const LinkGeometry geometry = {{test::torus(0.2, 0.06, 30, 16), pose(), "torus"},
+                                   {Box{{0.1, 0.2, 0.1}}, pose(), "box"},
+                                   {test::l_shape(0.3, 0.06), pose(), "l"}};
+    const Solid solid(geometry);
+    for (int i = 0; i < 200; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, 0.4);
+      const double infinity = std::numeric_limits<double>::infinity();
+      const double distance = distance_outside(solid, p, infinity).distance;
+      for (const double share : {0.5, 1.0 - 1e-7, 1.0 + 1e-7, 2.0}) {
+        const double limit = share * std::abs(distance);
+        EXPECT_EQ(is_within_distance(solid, p, limit), distance <= limit) << share;
+        ++(distance <= limit ? within : farther);
+      }
+    }
+  }
+  EXPECT_GT(within, static_cast<std::size_t>(test::scaled(10000)));
+  EXPECT_GT(farther, static_cast<std::size_t>(test::scaled(10000)));
 }
 
 }  // namespace

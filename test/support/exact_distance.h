@@ -80,4 +80,16 @@ double exact_distance(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
   return static_cast<double>(std::sqrt(static_cast<long double>(least)));
 }
 
+/// [m] Signed distance of p and a convex mesh.
+inline double exact_signed_distance(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
+  bool is_inside = true;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const RealVector<long double> a = real<long double>(mesh.corner(t, 0));
+    const RealVector<long double> n = cross(minus(real<long double>(mesh.corner(t, 1)), a),
+                                            minus(real<long double>(mesh.corner(t, 2)), a));
+    is_inside = is_inside && dot(n, minus(real<long double>(p), a)) <= 0;
+  }
+  return (is_inside ? -1.0 : 1.0) * exact_distance(mesh, p);
+}
+
 }  // namespace ist::test

@@ -135,6 +135,8 @@ std::vector<HostileMesh> hostile_meshes() {
   const TriangleMesh sheet_on_edge = shifted(sheet(0.05), {0.12, 0, 0});
   constexpr double k5mm = 0.005;
   return {
+      {"L", l_shape(0.2, 0.05), k5mm},
+      {"plate as thick as its error", thin_plate(0.1, k5mm), k5mm},
       {"box without a lid", open_box({0.1, 0.1, 0.2}), k5mm},
       {"sphere, every 10th triangle missing", perforated(sphere, 10), k5mm},
       {"half a sphere's triangles missing", perforated(sphere, 2), k5mm},
@@ -178,11 +180,21 @@ std::vector<HostileMesh> hostile_meshes() {
       {"100 m wide", scaled(sphere, 500.0), 2.0},
       {"1 km from the origin", shifted(sphere, {1000.0, 0, 0}), k5mm},
       {"almost 10 km from the origin", shifted(sphere, {-9999.0, 9999.0, 0}), k5mm},
-      {"1000 km from the origin", shifted(sphere, {0, 1e6, 0}), k5mm},
-      {"no triangle", TriangleMesh{}, k5mm},
-      {"a corner that is NaN", {{{0, 0, 0}, {NAN, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}, k5mm},
-      {"a corner at infinity", {{{0, 0, 0}, {INFINITY, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}, k5mm},
-      {"a corner that is not there", {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 7}}}, k5mm},
+      {"1000 km from the origin", shifted(sphere, {0, 1e6, 0}), k5mm,
+       "allowed are finite coordinates of at most 10000 m"},
+      {"no triangle", TriangleMesh{}, k5mm, "cannot pack a mesh without triangles"},
+      {"a corner that is NaN",
+       {{{0, 0, 0}, {NAN, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}},
+       k5mm,
+       "a corner of triangle 0 is not finite"},
+      {"a corner at infinity",
+       {{{0, 0, 0}, {INFINITY, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}},
+       k5mm,
+       "a corner of triangle 0 is not finite"},
+      {"a corner that is not there",
+       {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 7}}},
+       k5mm,
+       "triangle 0 names vertex 7 of 3"},
   };
 }
 

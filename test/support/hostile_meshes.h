@@ -13,7 +13,8 @@ namespace ist::test {
 struct HostileMesh {
   std::string name;
   TriangleMesh mesh;
-  double max_error;  ///< [m] of its packing
+  double max_error;        ///< [m] of its packing
+  std::string fault = {};  ///< a part of the error that refuses it; nothing: it is packed
 };
 
 TriangleMesh scaled(TriangleMesh mesh, double scale);
