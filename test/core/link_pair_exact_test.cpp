@@ -16,6 +16,7 @@
 #include "support/data_dir.h"
 #include "support/demo_arm.h"
 #include "support/link_pair_oracle.h"
+#include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"

@@ -74,8 +74,6 @@ PaddedBox box_of(const Eigen::AlignedBox3f& box) {
   return {{min.x(), min.y(), min.z(), 0.0F}, {max.x(), max.y(), max.z(), 0.0F}};
 }
 
-PaddedBox box_of(const Eigen::Vector3f& p) { return box_of(Eigen::AlignedBox3f(p)); }
-
 constexpr double kPeriod = 0.033;  // [s] of the clouds
 constexpr double kSearchDistance = 1.0;
 
