@@ -145,6 +145,31 @@ TEST_F(Cycle, AllocatesNothingOnceItIsSteady) {
   EXPECT_GT(contacts, 0);
 }
 
+// What a late frame may have moved is taken off the bounds, however little it is.
+TEST_F(Cycle, AllocatesNothingWhereAFrameIsLate) {
+  see_wall(0.5F);
+  Lag lag;
+  lag.frame = "the_frame_of_the_map_on_the_bench";
+  lag.age = lag.window = 0.1;
+  lag.windows = lag.moved.size();
+  lag.moved.fill(Eigen::Isometry3d(Eigen::Translation3d(1e-4, 0.0, 0.0)));
+  source_->set_lag(lag);
+  int near = 0;
+  for (int i = 0; i < 2000; ++i) {
+    boost::shared_ptr<ProximityArray> message;
+    const long count = step(&message);
+    if (i < 1000) continue;
+    ASSERT_EQ(count, 0) << "cycle " << i;
+    ASSERT_EQ(message->status, ProximityArray::OK) << message->status_text;
+    for (const auto& link : message->links) {
+      if (link.state != link.NEAR) continue;
+      ++near;
+      EXPECT_GT(link.distance - link.lower_bound, 1e-4 - 1e-9) << link.link;
+    }
+  }
+  EXPECT_GT(near, 1000);
+}
+
 // A message that a subscriber holds is not written to; what it no longer holds is used again.
 TEST_F(Cycle, LeavesMessagesAloneThatOthersHold) {
   see_wall(0.5F);

@@ -10,6 +10,8 @@
 #include <thread>
 
 #include "ros/poses/publisher_track.h"
+#include "ros/poses/transforms.h"
+#include "support/allocations.h"
 
 namespace ist {
 namespace {
@@ -99,6 +101,45 @@ TEST(TransformBuffer, agesCountFromReceipt) {
   // Transforms that are not between the two frames do not matter.
   EXPECT_EQ(buffer.counts_from("arm", "hand", ros::Time(100.81)), ros::Time(100.81));
   EXPECT_EQ(buffer.counts_from("world", "base", ros::Time(99.99)), ros::Time(99.99));
+}
+
+// A late frame is looked up in every cycle.
+TEST(TransformBuffer, tellsHowALateFrameMovedWithoutAllocationsOfItsOwn) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  for (int i = 0; i < 20; ++i) {  // 0.2 m/s
+    const double t = 100.0 + 0.05 * i;
+    EXPECT_EQ(buffer.add(transform("base", "part", t, 0.2 * t), "/a", false, ros::Time(t)), "");
+  }
+  Lag lag;
+  Eigen::Isometry3d X_FT;
+  const auto allocations_of = [](const auto& function) {
+    const long before = test::allocations;
+    function();
+    return test::allocations - before;
+  };
+  const long of_tf = allocations_of([&] {  // tf lists the transforms on the way to the newest
+    is_known(buffer, "base", "part", ros::Time(), nullptr);
+    look_up(buffer, "base", "part", ros::Time(), &X_FT);
+  });
+  for (const double late : {0.15, 0.05}) {
+    const ros::Time time(100.95 + late);
+    for (int i = 0; i < 3; ++i) {
+      std::string problem;
+      EXPECT_EQ(of_tf, allocations_of([&] {
+                  problem = look_up_near(buffer, "base", "part", time, 0.5, &X_FT, &lag);
+                }));
+      ASSERT_EQ(problem, "");
+    }
+    EXPECT_EQ(lag.frame, "part");
+    EXPECT_NEAR(lag.age, late, 1e-6);
+    EXPECT_NEAR(X_FT.translation().x(), 0.2 * 100.95, 1e-9);
+    ASSERT_EQ(lag.moves().size(), Lag::kMostWindows);
+    for (const Eigen::Isometry3d& moved : lag.moves()) {
+      EXPECT_NEAR(moved.translation().x(), 0.2 * lag.window, 1e-6);
+    }
+  }
+  EXPECT_EQ(look_up_near(buffer, "base", "part", ros::Time(100.5), 0.5, &X_FT, &lag), "");
+  EXPECT_TRUE(lag.moves().empty()) << "it is not late";
 }
 
 TEST(TransformBuffer, namesDisagreeingPublishers) {

@@ -51,6 +51,8 @@ class StatedSource : public ObstacleSource {
     snapshot_->stamp = snapshot_->counts_from = stamp;
     return &snapshot_->cloud;
   }
+  /// The cloud's frame is late.
+  void set_lag(const Lag& lag) { snapshot_->lags = {lag}; }
 
  private:
   SourceReport report_;

@@ -13,8 +13,14 @@ double turn_of(const Eigen::Isometry3d& moved) { return Eigen::AngleAxisd(moved.
 
 }  // namespace
 
+void LateFrames::begin() {
+  lags_.clear();
+  most_ = 0.0;
+  latest_ = nullptr;
+}
+
 void LateFrames::add(const Lag& lag) {
-  if (!lag.moved.empty()) lags_.push_back(&lag);
+  if (lag.windows > 0) lags_.push_back(&lag);
 }
 
 /// [m] How much nearer to a link an obstacle may have come that is `bound` from it.
@@ -23,7 +29,7 @@ double LateFrames::shift(std::size_t link, double bound, const Lag** lag) const 
   const Eigen::Vector3d center = X_FL_[link] * tree.center();
   double most = 0.0;
   for (const Lag* one : lags_) {
-    for (const Eigen::Isometry3d& moved : one->moved) {
+    for (const Eigen::Isometry3d& moved : one->moves()) {
       const double turned = turn_of(moved) * (tree.radius() + std::max(bound, 0.0));
       const double there = one->age / one->window * ((moved * center - center).norm() + turned);
       if (there <= most) continue;
@@ -38,7 +44,7 @@ double LateFrames::range(double max_distance) const {
   double farthest = max_distance, turn = 0.0;
   if (lags_.empty()) return farthest;
   for (const Lag* lag : lags_) {
-    for (const Eigen::Isometry3d& moved : lag->moved) {
+    for (const Eigen::Isometry3d& moved : lag->moves()) {
       turn = std::max(turn, lag->age / lag->window * turn_of(moved));
     }
   }

@@ -14,13 +14,17 @@ namespace ist {
 /// far as they move in that time, which is taken off the bounds. One thread.
 class LateFrames {
  public:
+  /// All of these outlive this.
   /// @param X_FL   by link
   /// @param known  by link: whether it has a pose
-  LateFrames(const RobotModel& robot, Span<const Eigen::Isometry3d> X_FL,
+  LateFrames(const RobotModel& robot, const std::vector<Eigen::Isometry3d>& X_FL,
              const std::vector<bool>& known)
       : robot_(robot), X_FL_(X_FL), known_(known) {}
 
-  /// @param lag  outlives this; one that is not late, or does not move, changes nothing
+  /// Begins a cycle: no frame is late.
+  void begin();
+
+  /// @param lag  outlives the cycle; one that is not late, or does not move, changes nothing
   void add(const Lag& lag);
 
   /// [m] The range in which obstacles may have come nearer than `max_distance` since.
@@ -38,7 +42,7 @@ class LateFrames {
   double shift(std::size_t link, double bound, const Lag** lag) const;
 
   const RobotModel& robot_;
-  const Span<const Eigen::Isometry3d> X_FL_;
+  const std::vector<Eigen::Isometry3d>& X_FL_;
   const std::vector<bool>& known_;
   std::vector<const Lag*> lags_;
   double most_ = 0.0;            ///< [m] that lower() took off

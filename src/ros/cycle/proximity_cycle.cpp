@@ -48,6 +48,8 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       joint_repulsion_(*model_),
       wanted_(wanted_links(*model_)),
       measurable_(wanted_),
+      late_worlds_(robot_, poses_.X_FL, known_),
+      late_maps_(robot_, poses_.X_FL, known_),
       results_(robot_.links.size()),
       pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
       wrenches_(robot_.links.size(), Wrench::unknown()) {
@@ -155,12 +157,11 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   known_ = measurable_;
   for (std::size_t i = 0; i < known_.size(); ++i) known_[i] = known_[i] && poses_.known[i];
   place_carried_objects();
-  LateFrames late_worlds(robot_, poses_.X_FL, known_), late_maps(robot_, poses_.X_FL, known_);
-  note_late_frames(&late_worlds, &late_maps);
+  note_late_frames();
   // The world is known exactly and costs little: it may take half of the time.
   worlds_.set_influence_distance(config.repulsion.influence_distance);
   worlds_.run(robot_, poses_.X_FL, known_, selection_, query, poses_.stamp.toSec(),
-              end_of(query.deadline, 0.5 * kQueryShare, begin), &late_worlds,
+              end_of(query.deadline, 0.5 * kQueryShare, begin), &late_worlds_,
               &status_input_.deadline);
   if (query.deadline > 0.0) {
     const std::chrono::duration<double> left =
@@ -169,15 +170,15 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   }
   ProximityQuery& clouds = queries_->query();
   const double max_distance = query.max_distance;
-  query.max_distance = late_maps.range(max_distance);
+  query.max_distance = late_maps_.range(max_distance);
   clouds.set_config(query);
   clouds.run(poses_.X_FL, known_, selection_.clouds(), &results_);
   const QueryStatistics& statistics = clouds.statistics();
   status_input_.outside_region = statistics.outside_region > 0;
   status_input_.deadline.unfinished += statistics.unfinished;
   status_input_.deadline.widest = std::max(status_input_.deadline.widest, statistics.widest);
-  late_maps.lower(max_distance, &results_);
-  for (const LateFrames* late : {&late_worlds, &late_maps}) {
+  late_maps_.lower(max_distance, &results_);
+  for (const LateFrames* late : {&late_worlds_, &late_maps_}) {
     const std::string doubt = late->doubt(query.tolerance);
     if (!doubt.empty()) status_input_.pose_doubts.push_back(doubt);
   }
@@ -187,7 +188,9 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
 }
 
 /// Finds the frames of worlds and maps whose poses are older than the links'.
-void ProximityCycle::note_late_frames(LateFrames* worlds, LateFrames* maps) const {
+void ProximityCycle::note_late_frames() {
+  late_worlds_.begin();
+  late_maps_.begin();
   const bool is_stated = pose_source_ && pose_source_->is_stated();
   for (const SourceSnapshot* source : selection_.selected()) {
     if (!source) continue;
@@ -196,7 +199,7 @@ void ProximityCycle::note_late_frames(LateFrames* worlds, LateFrames* maps) cons
       const Lag& lag = source->lags[i];
       // What the robot carries moves with the configuration that is stated.
       if (is_stated && model_->kinematics && model_->kinematics->find_body(lag.frame)) continue;
-      (i < objects ? worlds : maps)->add(lag);
+      (i < objects ? late_worlds_ : late_maps_).add(lag);
     }
   }
 }

@@ -111,7 +111,7 @@ class ProximityCycle {
   void take_warm_queries();
   void note_asked(const LiveConfig& config);
   void run_query(const LiveConfig& config, TimePoint begin);
-  void note_late_frames(LateFrames* worlds, LateFrames* maps) const;
+  void note_late_frames();
   void place_carried_objects();
   void ask_unknown_space(const LiveConfig& config);
   void find_urgent_links();
@@ -151,6 +151,7 @@ class ProximityCycle {
   Status status_{0, ""};
   std::vector<bool> measurable_, known_;  ///< by link of the robot
   StampedLinkPoses poses_;
+  LateFrames late_worlds_, late_maps_;
   StatusInput status_input_;
   std::vector<LinkProximity> results_;        ///< by link of the robot: clouds and worlds
   std::vector<LinkProximity> cloud_results_;  ///< the same of clouds alone

@@ -15,19 +15,21 @@ constexpr const char* kOwnFrame = "(other robot) ";
 
 /// How a frame that is in a frame R moves in another that R moves in.
 Lag compose(const Lag& outer, const Eigen::Isometry3d& X_FR, const Lag& inner) {
+  if (inner.windows == 0) return outer;
   Lag both = inner;
-  for (Eigen::Isometry3d& moved : both.moved) moved = X_FR * moved * X_FR.inverse();
-  if (outer.moved.empty()) return both;
-  if (both.moved.empty()) return outer;
+  for (std::size_t k = 0; k < both.windows; ++k) {
+    both.moved[k] = X_FR * inner.moved[k] * X_FR.inverse();
+  }
+  if (outer.windows == 0) return both;
   // The one of the higher share counts for both.
   if (outer.age * both.window > both.age * outer.window) {
     both.age = outer.age;
     both.window = outer.window;
   }
-  both.moved.resize(std::max(both.moved.size(), outer.moved.size()), Eigen::Isometry3d::Identity());
-  for (std::size_t k = 0; k < outer.moved.size(); ++k) {
-    both.moved[k] = outer.moved[k] * both.moved[k];
+  for (std::size_t k = 0; k < outer.windows; ++k) {
+    both.moved[k] = k < both.windows ? outer.moved[k] * both.moved[k] : outer.moved[k];
   }
+  both.windows = std::max(both.windows, outer.windows);
   return both;
 }
 

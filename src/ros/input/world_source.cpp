@@ -104,7 +104,7 @@ std::string WorldSource::place(const ros::Time& time, double max_age,
                                SourceSnapshot* snapshot) const {
   const std::string& fixed = snapshot->fixed_frame;
   const std::vector<std::string>& frames = snapshot->world.world->frames();
-  snapshot->lags.assign(frames.size() + (snapshot->cloud.boxes ? 1 : 0), Lag());
+  snapshot->lags.resize(frames.size() + (snapshot->cloud.boxes ? 1 : 0));
   for (std::size_t i = 0; i < frames.size(); ++i) {
     std::string problem =
         place_frame(fixed, frames[i], time, max_age, &snapshot->world.X_FB[i], &snapshot->lags[i]);

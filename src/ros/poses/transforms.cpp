@@ -18,7 +18,6 @@ constexpr double kMaxDistance = 1e4;
 // Of the motion of a frame whose pose is late: shorter ones would measure the noise of its pose.
 // [s]
 constexpr double kLeastWindow = 0.1;
-constexpr int kWindows = 3;
 
 bool has_slash(const std::string& frame) { return !frame.empty() && frame[0] == '/'; }
 
@@ -89,26 +88,28 @@ std::string look_up_newest(const TransformBuffer& buffer, const std::string& fix
 std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
                          const std::string& frame, const ros::Time& time, double max_age,
                          Eigen::Isometry3d* X_FT, Lag* lag) {
-  if (lag) *lag = Lag();
-  std::string problem;
-  if (is_known(buffer, fixed, frame, time, &problem)) {
+  if (lag) {
+    lag->age = 0.0;
+    lag->windows = 0;
+  }
+  if (is_known(buffer, fixed, frame, time, nullptr)) {
     return look_up(buffer, fixed, frame, time, X_FT);
   }
   ros::Time stamp;
-  problem = look_up_newest(buffer, fixed, frame, time, max_age, X_FT, &stamp);
+  std::string problem = look_up_newest(buffer, fixed, frame, time, max_age, X_FT, &stamp);
   if (!problem.empty() || !lag || stamp.isZero()) return problem;
   lag->frame = frame;
   lag->age = std::abs(seconds_between(stamp, time));
   lag->window = std::max(lag->age, kLeastWindow);
   Eigen::Isometry3d X_after = *X_FT;
-  for (int k = 0; k < kWindows && stamp.toSec() > lag->window; ++k) {
+  while (lag->windows < Lag::kMostWindows && stamp.toSec() > lag->window) {
     Eigen::Isometry3d X;
     stamp -= ros::Duration(lag->window);
-    if (!is_known(buffer, fixed, frame, stamp, &problem) ||
+    if (!is_known(buffer, fixed, frame, stamp, nullptr) ||
         !look_up(buffer, fixed, frame, stamp, &X).empty()) {
       break;
     }
-    lag->moved.push_back(X_after * X.inverse());
+    lag->moved[lag->windows++] = X_after * X.inverse();
     X_after = X;
   }
   return "";
@@ -120,15 +121,17 @@ bool is_known(const TransformBuffer& buffer, const std::string& fixed, const std
     return is_known(buffer, without_slash(fixed), without_slash(frame), time, problem);
   }
   if (frame == fixed) return true;
-  *problem = buffer.dispute(fixed, frame);
-  if (!problem->empty()) return false;
-  std::string error;
+  std::string error = buffer.dispute(fixed, frame);
+  if (!error.empty()) {
+    if (problem) *problem = error;
+    return false;
+  }
   try {
-    if (buffer.canTransform(fixed, frame, time, &error)) return true;
+    if (buffer.canTransform(fixed, frame, time, problem ? &error : nullptr)) return true;
   } catch (const std::exception& exception) {
     error = exception.what();
   }
-  *problem = "no transform from '" + frame + "' to '" + fixed + "': " + trimmed(error);
+  if (problem) *problem = "no transform from '" + frame + "' to '" + fixed + "': " + trimmed(error);
   return false;
 }
 

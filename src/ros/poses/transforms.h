@@ -3,9 +3,11 @@
 #include <ros/time.h>
 
 #include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
 #include <string>
-#include <vector>
 
+#include "ist_proximity/geometry/span.h"
 #include "ros/poses/transform_buffer.h"
 
 namespace ist {
@@ -26,21 +28,27 @@ std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
                     ros::Time* stamp = nullptr);
 
 /// Whether look_up() would succeed. It costs less than a look_up() that fails.
-/// @param problem  set where the answer is false
+/// @param problem  set where the answer is false; may be null
 bool is_known(const TransformBuffer& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem);
 
 /// How a frame moved until its newest pose, which is older than the instant that it is asked for.
 struct Lag {
+  static constexpr std::size_t kMostWindows = 3;
+
   std::string frame;
-  double age = 0.0;     ///< [s] of the pose at that instant; 0: it is not late
-  double window = 1.0;  ///< [s] in each of which it moved by the poses of `moved`, in frame F
-  std::vector<Eigen::Isometry3d> moved;
+  double age = 0.0;         ///< [s] of the pose at that instant; 0: it is not late
+  double window = 1.0;      ///< [s] in each of which it moved by one of moves(), in frame F
+  std::size_t windows = 0;  ///< of which its poses are known, the last one first
+  std::array<Eigen::Isometry3d, kMostWindows> moved;
+
+  Span<const Eigen::Isometry3d> moves() const { return {moved.data(), windows}; }
 };
 
 /// Looks up the pose at an instant, or else the newest one, as look_up_newest(). The windows of
 /// `lag` are three, each as long as the age or 0.1 s, so that a frame that turns back is not taken
-/// for one that stands; there are fewer where the frame is new.
+/// for one that stands; there are fewer where the frame is new. A lag that is used again keeps the
+/// memory of its name, so that nothing is allocated.
 /// @param lag  may be null
 std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
                          const std::string& frame, const ros::Time& time, double max_age,
