@@ -118,6 +118,38 @@ class StatusTest(pt.NodeTest):
             "pose diagnostics OK",
         )
 
+    def test_transforms_of_the_future_beside_good_ones(self):
+        """They are told, whoever else gives their frame a pose, and are not used."""
+        node = self.start()
+        self.world.poses["wrist"] = ("base", pt.transform())
+        self.world.start_tf()
+        publisher = self.world.cloud_publisher
+        self.world.repeat(20, lambda: publisher.publish(pt.cloud(POINT, "wrist")))
+        for frame, begins in (("ball_link", "the"), ("wrist", "source 'cloud': the")):
+            node.wait_for_status(ProximityArray.OK)
+
+            def send(frame=frame):
+                stamp = rospy.Time.now() + rospy.Duration(2.0)
+                X = pt.transform((0, 0, 0.1))
+                self.world.publish_transforms([pt.transform_message("base", frame, X, stamp)])
+
+            ahead = self.world.repeat(100, send)
+            message = node.wait_for_status(ProximityArray.DEGRADED, "compare the clocks")
+            self.assertRegex(
+                message.status_text,
+                "^%s transform from '%s' to 'base' of %s is stamped (2.0|1.9). s in the future and "
+                "not used" % (begins, frame, rospy.get_name()),
+            )
+            begin = len(node.messages)
+            node.wait_for(lambda m: len(node.messages) >= begin + 100, "100 messages")
+            told = [m for m in node.messages[begin:] if m.status == ProximityArray.DEGRADED]
+            self.assertGreater(len(told), 80)
+            ahead.stop()
+        node.wait_for_status(ProximityArray.OK)
+        known = [m for m in node.messages if not pt.all_unknown(m)]
+        for distance in {pt.link(m, "ball_link").distance for m in known}:
+            self.assertAlmostEqual(distance, 0.2, 5)
+
     def start_late_tf(self, late):
         def send_late_tf():
             stamp = rospy.Time.now() - rospy.Duration(late)

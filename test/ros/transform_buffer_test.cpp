@@ -56,9 +56,27 @@ TEST(TransformBuffer, refusesWithTheReason) {
   buffer.add(bad, "/a", false, now);
   EXPECT_NE(buffer.why_refused("world", "hand").find("from 'arm' to 'base'"), std::string::npos);
   EXPECT_EQ(buffer.why_refused("arm", "hand"), "");
-  // A good transform ends it.
-  EXPECT_EQ(buffer.add(transform("base", "arm", 99.96), "/a", false, now), "");
-  EXPECT_EQ(buffer.why_refused("arm", "base"), "");
+}
+
+// Where good transforms come beside them, refused ones were in the log alone.
+TEST(TransformBuffer, twoGoodTransformsOfItsPublisherEndARefusal) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  double t = 100.0;
+  const auto send = [&](const char* publisher, double ahead) {
+    t += 0.01;
+    return buffer.add(transform("base", "arm", t + ahead), publisher, false, ros::Time(t)).empty();
+  };
+  EXPECT_FALSE(send("/b", 2.0));
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(send("/a", 0.0));
+  EXPECT_NE(buffer.why_refused("base", "arm").find("of /b is stamped 2.00 s in the future"),
+            std::string::npos);
+  EXPECT_EQ(buffer.why_refused("base", "base"), "");
+  EXPECT_TRUE(send("/b", 0.0));
+  EXPECT_FALSE(send("/b", 2.0));
+  EXPECT_TRUE(send("/b", 0.0));
+  EXPECT_NE(doubt_of_pose(buffer, "base", "arm").find("of /b"), std::string::npos);
+  EXPECT_TRUE(send("/b", 0.0));
+  EXPECT_EQ(doubt_of_pose(buffer, "base", "arm"), "");
 }
 
 // A static transform is sent once. Its reason was forgotten a second after it was refused, and then

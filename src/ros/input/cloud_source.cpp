@@ -82,7 +82,7 @@ const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel
   if (!state_.is_current(snapshot.get(), model)) return nullptr;
   if (!is_map_) {
     const std::string dispute = buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame);
-    state_.set_placing_problem(dispute);
+    state_.set_placing(dispute, doubt_of_pose(buffer_, snapshot->fixed_frame, snapshot->map_frame));
     return dispute.empty() ? snapshot.get() : nullptr;
   }
   if (map_ != snapshot) {
@@ -90,7 +90,8 @@ const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel
     placed_map_ = *snapshot;
   }
   const std::string problem = place(time, max_age, &placed_map_);
-  state_.set_placing_problem(problem);
+  state_.set_placing(problem,
+                     doubt_of_pose(buffer_, placed_map_.fixed_frame, placed_map_.map_frame));
   return problem.empty() ? &placed_map_ : nullptr;
 }
 

@@ -87,9 +87,10 @@ void SourceState::set_file_problem(const std::string& problem) {
   file_problem_ = problem;
 }
 
-void SourceState::set_placing_problem(const std::string& problem) {
+void SourceState::set_placing(const std::string& problem, const std::string& doubt) {
   const std::lock_guard<std::mutex> lock(mutex_);
   placing_problem_ = problem;
+  report_.doubt_of_place = doubt;
 }
 
 /// The caller holds mutex_.

@@ -62,10 +62,10 @@ class SourceState {
   /// Brackets the reading and ingesting of a message, which a status names where it takes too long.
   void begin_work();
   void end_work();
-  /// Sets a problem with a map's file or with its place in the fixed frame. It stays until it is
-  /// set again, whatever messages come.
+  /// Sets a problem with a map's file, or with its place in the fixed frame and a doubt about it.
+  /// They stay until they are set again, whatever messages come.
   void set_file_problem(const std::string& problem);
-  void set_placing_problem(const std::string& problem);
+  void set_placing(const std::string& problem, const std::string& doubt);
 
  private:
   void notice_clock_jump();

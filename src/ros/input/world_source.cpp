@@ -87,7 +87,7 @@ const SourceSnapshot* WorldSource::newest(const std::shared_ptr<const RobotModel
     placed_ = *snapshot;
   }
   const std::string problem = place(time, max_age, &placed_);
-  state_.set_placing_problem(problem);
+  state_.set_placing(problem, doubt_of_place(placed_));
   return problem.empty() ? &placed_ : nullptr;
 }
 
@@ -116,6 +116,16 @@ std::string WorldSource::place(const ros::Time& time, double max_age,
       place_frame(fixed, snapshot->map_frame, time, max_age, &X_FB, &snapshot->lags.back());
   if (problem.empty()) snapshot->cloud.X_FM = X_FB * snapshot->X_BM;
   return problem;
+}
+
+/// The first doubt about where the frames of a snapshot are; empty: none.
+std::string WorldSource::doubt_of_place(const SourceSnapshot& snapshot) const {
+  std::string doubt;
+  for (const std::string& frame : snapshot.world.world->frames()) {
+    if (frame == kFixedFrame || (robot_ && robot_->owns(frame))) continue;
+    if (doubt.empty()) doubt = doubt_of_pose(buffer_, snapshot.fixed_frame, frame);
+  }
+  return doubt;
 }
 
 /// Looks up where a frame is at an instant, or else at the newest one that tf knows.

@@ -110,6 +110,7 @@ class WorldSource : public ObstacleSource {
   void free_unused();
   void publish_markers();
   std::string place(const ros::Time& time, double max_age, SourceSnapshot* snapshot) const;
+  std::string doubt_of_place(const SourceSnapshot& snapshot) const;
   std::string place_frame(const std::string& fixed_frame, const std::string& frame,
                           const ros::Time& time, double max_age, Eigen::Isometry3d* X_FB,
                           Lag* lag) const;

@@ -155,12 +155,17 @@ bool JointPoseSource::must_hold(const ros::Time& instant) const {
 
 void JointPoseSource::describe_doubts(StampedLinkPoses* poses) const {
   const auto& joints = kinematics_->joints();
+  const auto& bodies = kinematics_->bodies();
+  poses->add_doubt(doubt_of_pose(buffer_, fixed_frame_, bodies[0]));
   for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (joints[j].has_unstated_pose()) {
+      poses->add_doubt(doubt_of_pose(buffer_, bodies[joints[j].parent], bodies[joints[j].child]));
+    }
     if (!matters_[j] || std::isnan(q_[j]) || !positions_[j].is_implausible) continue;
-    poses->doubts.push_back("joint '" + joints[j].name +
-                            format_text("' is at %g, far outside its limits of %g to %g: is its "
-                                        "unit right?",
-                                        q_[j], joints[j].lower, joints[j].upper));
+    poses->add_doubt("joint '" + joints[j].name +
+                     format_text("' is at %g, far outside its limits of %g to %g: is its "
+                                 "unit right?",
+                                 q_[j], joints[j].lower, joints[j].upper));
   }
 }
 

@@ -18,6 +18,11 @@ void StampedLinkPoses::set_problem(const std::vector<bool>& wanted, const PosePr
   }
 }
 
+void StampedLinkPoses::add_doubt(const std::string& doubt) {
+  const bool is_new = std::find(doubts.begin(), doubts.end(), doubt) == doubts.end();
+  if (is_new && !doubt.empty()) doubts.push_back(doubt);
+}
+
 std::size_t StampedLinkPoses::count_known() const {
   return static_cast<std::size_t>(std::count(known.begin(), known.end(), true));
 }

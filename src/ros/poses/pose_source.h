@@ -32,6 +32,8 @@ struct StampedLinkPoses : LinkPoses {
   void reset(const ros::Time& now, std::size_t links);
   /// Gives every wanted link the same problem.
   void set_problem(const std::vector<bool>& wanted, const PoseProblem& problem);
+  /// Adds a sentence to `doubts`, once; empty: nothing.
+  void add_doubt(const std::string& doubt);
   std::size_t count_known() const;
 };
 

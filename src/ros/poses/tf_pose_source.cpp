@@ -60,6 +60,7 @@ void TfPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
       problem.text = ist::look_up(buffer_, fixed_frame_, frames_[i], poses->stamp, &poses->X_FL[i]);
     }
     poses->known[i] = problem.empty();
+    if (poses->known[i]) poses->add_doubt(doubt_of_pose(buffer_, fixed_frame_, frames_[i]));
   }
 }
 

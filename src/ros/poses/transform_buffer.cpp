@@ -14,6 +14,7 @@ namespace ist {
 namespace {
 
 constexpr std::chrono::seconds kMemory(1);
+constexpr int kGoodEnough = 2;  // transforms after a refused one: one may be of every other
 constexpr std::size_t kMaxFrames = 10000;  // a limit of memory; robots have some hundred
 constexpr std::size_t kMaxDepth = 1000;    // tf's own
 
@@ -71,8 +72,9 @@ std::string TransformBuffer::check(const geometry_msgs::TransformStamped& transf
 }
 
 std::string TransformBuffer::refuse(const geometry_msgs::TransformStamped& transform,
-                                    const std::string& fault, bool is_static) {
-  std::string sentence = title(transform) + fault;
+                                    const std::string& publisher, const std::string& fault,
+                                    bool is_static) {
+  std::string sentence = title(transform) + "of " + publisher + " " + fault;
   const std::lock_guard<std::mutex> lock(mutex_);
   last_refusal_ = sentence;
   last_refusal_time_ = Clock::now();
@@ -82,10 +84,19 @@ std::string TransformBuffer::refuse(const geometry_msgs::TransformStamped& trans
   Record& record = found == records_.end() ? records_[child] : found->second;
   record.parent = without_slash(transform.header.frame_id);
   record.refusal = sentence;
-  record.refusal_time = last_refusal_time_;
+  record.refused_publisher = publisher;
+  record.good_since = 0;
+  record.refusal_time = last_refusal_time_.load();
   if (is_static && !record.refusal_stays) ++lasting_refusals_;
   record.refusal_stays = record.refusal_stays || is_static;
   return sentence;
+}
+
+/// Forgets why a publisher's earlier transforms were refused once it sends good ones. The caller
+/// holds mutex_.
+void TransformBuffer::note_good(const std::string& publisher, Record* record) {
+  if (record->refusal_stays || record->refused_publisher != publisher) return;
+  if (++record->good_since >= kGoodEnough) record->refusal.clear();
 }
 
 /// Forgets why an earlier transform of a frame was refused, since tf has another now.
@@ -102,14 +113,14 @@ void TransformBuffer::accept(const std::string& child) {
 std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transform,
                                  const Publisher& publisher, bool is_static, const ros::Time& now) {
   const std::string fault = check(transform, is_static, now);
-  if (!fault.empty()) return refuse(transform, fault, is_static);
+  if (!fault.empty()) return refuse(transform, publisher.name, fault, is_static);
   const std::string child = without_slash(transform.child_frame_id);
   std::unique_lock<std::mutex> lock(mutex_);
   const auto found = records_.find(child);
   if (found == records_.end() && records_.size() >= kMaxFrames) {
     lock.unlock();
-    return refuse(transform, format_text("is not used: there are %zu frames", kMaxFrames),
-                  is_static);
+    return refuse(transform, publisher.name,
+                  format_text("is not used: there are %zu frames", kMaxFrames), is_static);
   }
   Record& record = found == records_.end() ? records_[child] : found->second;
   note_statement(transform, publisher, is_static, now, &record);
@@ -121,7 +132,7 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
     const double behind = seconds_between(stamp, record.newest);
     if (!record.newest.isZero() && behind > getCacheLength().toSec()) {
       lock.unlock();
-      return refuse(transform,
+      return refuse(transform, publisher.name,
                     format_text("is not used: its stamp is %.2f s behind that of another "
                                 "one; are there two publishers, with two clocks?",
                                 behind),
@@ -133,7 +144,7 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
       record.ahead = seconds_between(now, stamp);
       any_ahead_ = any_ahead_ || record.ahead > kClockResolution;
       if (record.ahead >= kToldSkew) record.ahead_time = skew_time_ = Clock::now();
-      if (!record.refusal_stays) record.refusal.clear();
+      note_good(publisher.name, &record);
     }
   }
   lock.unlock();
@@ -147,7 +158,7 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
   } catch (const std::exception& error) {
     problem = std::string("is not used: ") + error.what();
   }
-  return refuse(transform, problem, is_static);
+  return refuse(transform, publisher.name, problem, is_static);
 }
 
 void TransformBuffer::compare(const geometry_msgs::TransformStamped& transform,
@@ -310,7 +321,7 @@ void TransformBuffer::clear() {
 
 std::string TransformBuffer::last_refusal() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (Clock::now() - last_refusal_time_ < kMemory) return last_refusal_;
+  if (Clock::now() - last_refusal_time_.load() < kMemory) return last_refusal_;
   if (lasting_refusals_ == 0) return "";
   const auto record = std::find_if(records_.begin(), records_.end(),
                                    [](const auto& entry) { return entry.second.refusal_stays; });
@@ -369,9 +380,9 @@ std::vector<std::string> TransformBuffer::between(const std::string& fixed_frame
 }
 
 std::string TransformBuffer::why_refused(const std::string& fixed, const std::string& frame) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
   const auto now = Clock::now();
-  if (now - last_refusal_time_ > kMemory && lasting_refusals_ == 0) return "";
+  if (now - last_refusal_time_.load() > kMemory && lasting_refusals_ == 0) return "";
+  const std::lock_guard<std::mutex> lock(mutex_);
   for (const std::string& child : between(fixed, frame)) {
     const auto record = records_.find(child);
     if (record == records_.end() || record->second.refusal.empty()) continue;

@@ -22,7 +22,8 @@ namespace ist {
 /// A tf buffer that checks transforms before tf2 does, and remembers what was wrong with them.
 ///
 /// tf2 logs every transform that it refuses, and nobody can ask it afterwards why a frame has no
-/// fresh pose. Here the reason stays for a second after the last refusal, and goes to the status. A
+/// fresh pose. Here the reason stays for a second after the last refusal, or until the publisher
+/// has sent two good ones, and goes to the status: also where others give the frame a pose. A
 /// static transform is sent once, so the reason of its refusal stays until another takes its place.
 /// The buffer also remembers which transforms were stamped ahead of the clock, so that their age
 /// counts from their receipt.
@@ -83,7 +84,7 @@ class TransformBuffer : public tf2::BufferCore {
   std::string ahead() const;
 
   /// Why transforms between a frame and another above it have been refused in the last second, or
-  /// static ones at any time; empty when none was.
+  /// static ones at any time; empty when none was, which costs nothing.
   /// @param fixed  where the way up ends, if it is on the way
   std::string why_refused(const std::string& fixed, const std::string& frame) const;
 
@@ -115,8 +116,9 @@ class TransformBuffer : public tf2::BufferCore {
     double ahead = 0.0;  ///< [s] of the newest one's stamp at its receipt; may be negative
     ros::Time received;  ///< receipt of the newest transform
     Clock::time_point ahead_time;
-    std::string refusal;
+    std::string refusal, refused_publisher;
     Clock::time_point refusal_time;
+    int good_since = 0;          ///< transforms of that publisher that were used since
     bool refusal_stays = false;  ///< of a static transform, which is not sent again
     PublisherTrack track;
     std::vector<Statement> statements;  ///< by publisher, in the order of their first ones
@@ -127,8 +129,9 @@ class TransformBuffer : public tf2::BufferCore {
 
   std::string check(const geometry_msgs::TransformStamped& transform, bool is_static,
                     const ros::Time& now) const;
-  std::string refuse(const geometry_msgs::TransformStamped& transform, const std::string& fault,
-                     bool is_static);
+  std::string refuse(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
+                     const std::string& fault, bool is_static);
+  static void note_good(const std::string& publisher, Record* record);
   void accept(const std::string& child);
   void note_statement(const geometry_msgs::TransformStamped& transform, const Publisher& publisher,
                       bool is_static, const ros::Time& now, Record* record);
@@ -143,8 +146,9 @@ class TransformBuffer : public tf2::BufferCore {
   mutable std::mutex mutex_;                         // guards the members below
   std::unordered_map<std::string, Record> records_;  ///< by child frame, without a slash
   std::string last_refusal_;
-  std::size_t lasting_refusals_ = 0;  ///< records whose refusal stays
-  Clock::time_point last_refusal_time_, skew_time_;
+  std::atomic<std::size_t> lasting_refusals_{0};  ///< records whose refusal stays
+  std::atomic<Clock::time_point> last_refusal_time_{Clock::time_point()};
+  Clock::time_point skew_time_;
   bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
   std::atomic<std::size_t> disputes_{0};  ///< records with a dispute
 };

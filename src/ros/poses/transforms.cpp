@@ -143,6 +143,12 @@ std::string with_cause(const TransformBuffer& buffer, const std::string& fixed,
   return cause.empty() ? problem : problem + ": " + cause;
 }
 
+std::string doubt_of_pose(const TransformBuffer& buffer, const std::string& fixed,
+                          const std::string& frame) {
+  const std::string refusal = buffer.why_refused(fixed, frame);
+  return refusal.empty() ? refusal : refusal + "; the pose in use is that of other transforms";
+}
+
 std::string too_old(const std::string& fixed, const std::string& frame, double age,
                     double max_age) {
   return "the newest transform from '" + frame + "' to '" + fixed +

@@ -66,6 +66,11 @@ std::string with_cause(const TransformBuffer& buffer, const std::string& fixed,
                        const std::string& frame, const std::string& problem,
                        bool* explained = nullptr);
 
+/// Why transforms between two frames are refused, though others give a pose, as a doubt about that;
+/// empty: none is.
+std::string doubt_of_pose(const TransformBuffer& buffer, const std::string& fixed,
+                          const std::string& frame);
+
 /// The sentence about a transform that is older than ~pose_timeout. Ages in seconds.
 std::string too_old(const std::string& fixed, const std::string& frame, double age, double max_age);
 

@@ -162,7 +162,9 @@ bool StatusInput::is_fine() const {
          pose_doubts.empty() && unknown_space_problem.empty() && !deadline.any() &&
          !outside_region &&
          std::all_of(source_statuses.begin(), source_statuses.end(),
-                     [](const Status& status) { return status.ok(); });
+                     [](const Status& status) { return status.ok(); }) &&
+         std::all_of(sources.begin(), sources.end(),
+                     [](const SourceReport& source) { return source.doubt_of_place.empty(); });
 }
 
 Status overall_status(const StatusInput& input, double now) {
