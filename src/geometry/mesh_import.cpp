@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <assimp/IOStream.hpp>
 #include <assimp/IOSystem.hpp>
+#include <assimp/ProgressHandler.hpp>
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -54,6 +55,19 @@ class MemoryStream : public Assimp::IOStream {
   std::size_t at_ = 0;
 };
 
+// Assimp asks it now and then, and between its steps, whether to go on.
+class Progress : public Assimp::ProgressHandler {
+ public:
+  explicit Progress(const CancelRequest& cancelled) : cancelled_(cancelled) {}
+  bool Update(float /*done*/) override {
+    throw_if(cancelled_);  // some importers do not ask for what is returned
+    return true;
+  }
+
+ private:
+  const CancelRequest& cancelled_;
+};
+
 class MeshFiles : public Assimp::IOSystem {
  public:
   MeshFiles(std::string path, const std::string& bytes, const CancelRequest& cancelled)
@@ -94,6 +108,8 @@ const aiScene* import_mesh(const std::string& path, const std::string& bytes,
   importer->SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer->SetIOHandler(new MeshFiles(path, bytes, cancelled));  // the importer deletes it
+  Progress progress(cancelled);
+  importer->SetProgressHandler(&progress);
   const aiScene* scene = nullptr;
   try {
     scene = importer->ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType);
@@ -101,6 +117,7 @@ const aiScene* import_mesh(const std::string& path, const std::string& bytes,
   } catch (const std::exception& error) {
     *reason = error.what();
   }
+  importer->SetProgressHandler(nullptr);
   throw_if(cancelled);  // assimp makes an error of its own of the exception
   return scene != nullptr && scene->mRootNode != nullptr ? scene : nullptr;
 }

@@ -23,7 +23,7 @@ struct Drawing {
   std::vector<std::string> above;  // links that fixed joints lead to it from, the nearest first
   Eigen::Isometry3d X_TL = Eigen::Isometry3d::Identity();   // T: the last of those, or itself
   std::vector<std::pair<Eigen::Vector3d, double>> samples;  // [m, m^2] in L, with their areas
-  Eigen::AlignedBox3d box;                                  // [m] in L
+  Eigen::AlignedBox3d box, box_T;                           // [m] in L, and in T
   std::size_t triangles = 0;                                // of meshes
 
   const std::string& top() const { return above.empty() ? link->name : above.back(); }
@@ -52,7 +52,11 @@ void add_element(const GeometryElement& element, Drawing* drawing) {
   const std::size_t step = 1 + mesh.triangles.size() / kSamples;
   for (std::size_t t = 0; t < mesh.triangles.size(); t += step) {
     const Eigen::Vector3d &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);
-    for (const auto* corner : {&a, &b, &c}) drawing->box.extend(element.X_LE * *corner);
+    for (const auto* corner : {&a, &b, &c}) {
+      const Eigen::Vector3d p_L = element.X_LE * *corner;
+      drawing->box.extend(p_L);
+      drawing->box_T.extend(drawing->X_TL * p_L);
+    }
     const double area = 0.5 * static_cast<double>(step) * (b - a).cross(c - a).norm();
     drawing->samples.emplace_back(element.X_LE * Eigen::Vector3d((a + b + c) / 3.0), area);
   }
@@ -73,10 +77,10 @@ Drawing draw(const LinkDescription& link, const JointOfChild& joints) {
 
 // What takes no time to find out.
 bool may_enclose(const Drawing& hull, const Drawing& link) {
-  return hull.link != link.link && hull.top() == link.top() && !link.is_below(hull) &&
-         hull.triangles <= link.triangles &&
+  return hull.triangles <= link.triangles && hull.box_T.intersects(link.box_T) &&
+         hull.box.sizes().norm() > 0.0 &&
          link.box.sizes().norm() >= kSmallestRatio * hull.box.sizes().norm() &&
-         hull.box.sizes().norm() > 0.0;
+         hull.link != link.link && hull.top() == link.top() && !link.is_below(hull);
 }
 
 bool encloses(const Solid& hull, const Drawing& link, const Eigen::Isometry3d& X_HL) {
@@ -106,10 +110,13 @@ std::vector<CoarseHull> coarse_hulls(const RobotDescription& robot,
     if (is_drawn(link)) drawings.push_back(draw(link, joints));
   }
   std::vector<CoarseHull> hulls;
+  CancelWatch watch(cancelled);
   for (const Drawing& hull : drawings) {
     Solid solid;
     for (const Drawing& link : drawings) {
+      watch.step();
       if (!may_enclose(hull, link)) continue;
+      throw_if(cancelled);
       if (solid.empty()) solid = make_solid(hull.link->geometry, cancelled);
       if (!encloses(solid, link, hull.X_TL.inverse() * link.X_TL)) continue;
       hulls.push_back({hull.link->name, link.link->name, hull.is_below(link)});

@@ -260,6 +260,25 @@ TEST(SelfCollisionPairs, SrdfTellsWhatItDoesNotUse) {
   }
 }
 
+// An SRDF of another robot, of a million pairs, is told in a line and does not hold up the end.
+TEST(SelfCollisionPairs, LargeSrdf) {
+  const Robot robot;
+  std::string srdf = "<robot name='r'>";
+  for (int i = 0; i < 20000; ++i) {
+    srdf += "<disable_collisions link1='x" + std::to_string(i) + "' link2='a'/>";
+  }
+  srdf += "</robot>";
+  const CollisionRules rules = read_srdf(srdf, &robot.kinematics);
+  EXPECT_EQ(rules.disabled.size(), 20000U);
+  ASSERT_EQ(rules.doubts.size(), 1U);
+  EXPECT_NE(rules.doubts[0].find("'x9' in <disable_collisions> (line 1) and 19990 more"),
+            std::string::npos)
+      << rules.doubts[0];
+  int asked = 0;
+  EXPECT_THROW(read_srdf(srdf, nullptr, [&] { return ++asked == 3; }), ModelError);
+  EXPECT_EQ(asked, 3);
+}
+
 // base - j - arm - k - tip: a sphere far out on the arm, another one on the base in its way.
 struct Limits {
   std::string type = "revolute";  // of j

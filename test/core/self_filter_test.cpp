@@ -316,6 +316,9 @@ TEST(SelfFilter, NothingBetweenALinkAndACoarseHullIsDropped) {
   EXPECT_EQ(hulls[0].link, "arm_sc");
   EXPECT_EQ(hulls[0].enclosed, "arm");
   EXPECT_TRUE(hulls[0].is_below);
+  int asked = 0;
+  EXPECT_THROW(coarse_hulls(description, [&] { return ++asked == 4; }), Cancelled)
+      << "after each of the two links and before the search";
   RobotModelConfig model_config;
   model_config.links = {"arm", "arm_sc"};
   const auto model = build_robot_model(description, model_config, {});

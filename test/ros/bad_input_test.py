@@ -270,6 +270,22 @@ class BadModelTest(pt.NodeTest):
         self.assertEqual(node.stop(), 0)
         self.assertLess(time.time() - begin, 3.0)
 
+    def test_large_srdf_does_not_hold_up_the_end(self):
+        """400,000 pairs: SIGINT ends the node soon while they are read, and later."""
+        pair = '<disable_collisions link1="robot_link_%d" link2="robot_link_%d" reason="Never"/>'
+        pairs = [pair % (i, k) for i in range(895) for k in range(i)]
+        srdf = '<robot name="tiny">%s</robot>' % "".join(pairs)
+        rospy.set_param(self.namespace + "/robot_description_semantic", srdf)
+        for condition, what in (
+            (lambda m: "reading the SRDF in" in m.status_text, "the reading of the SRDF"),
+            (lambda m: m.status != ProximityArray.LOADING and m.links, "the end of loading"),
+        ):
+            node = self.start(pt.urdf())
+            node.wait_for(condition, what, start=0, timeout=60)
+            begin = time.time()
+            self.assertEqual(node.stop(), 0)
+            self.assertLess(time.time() - begin, 3.0)
+
     def test_mesh_that_appears(self):
         """A mesh is missing at first; ~reload_model reads it once it is there."""
         path = os.path.join(self.folder, "late.stl")

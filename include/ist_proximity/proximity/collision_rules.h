@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <set>
 #include <string>
 #include <utility>
@@ -28,8 +29,10 @@ struct CollisionRules {
 
 /// Reads an SRDF's statements about collisions.
 /// @param kinematics  of the URDF, to find links that it lacks; null: names are not compared
-/// @throws ModelError when the text is no SRDF
-CollisionRules read_srdf(const std::string& srdf_xml, const Kinematics* kinematics);
+/// @param cancelled   true ends the reading; it is called every few milliseconds, and may be empty
+/// @throws ModelError when the text is no SRDF, or the reading was cancelled
+CollisionRules read_srdf(const std::string& srdf_xml, const Kinematics* kinematics,
+                         const std::function<bool()>& cancelled = {});
 
 /// The pairs are those without rules, less what the rules disable, and with adjacent links that
 /// they enable.

@@ -168,14 +168,17 @@ void ModelLoader::load_once() {
 }
 
 /// Reads the SRDF beside the URDF, where there is one.
-void ModelLoader::read_rules(ModelState* state) const {
+void ModelLoader::read_rules(ModelState* state) {
   std::string key, srdf;
   if (!nh_.searchParam(config_.robot_description + "_semantic", key) || !nh_.getParam(key, srdf)) {
     return;
   }
+  state->problem = "reading the SRDF in '" + key + "'";
+  set_state(*state);
   try {
-    state->rules = read_srdf(srdf, state->kinematics.get());
-    for (const std::string& doubt : state->rules.doubts) {
+    state->rules = std::make_shared<const CollisionRules>(
+        read_srdf(srdf, state->kinematics.get(), [this] { return cancelled(); }));
+    for (const std::string& doubt : state->rules->doubts) {
       state->warnings.push_back("'" + key + "': " + doubt);
     }
   } catch (const ModelError& error) {
@@ -188,7 +191,7 @@ void ModelLoader::choose(ModelState* state) const {
   const RobotDescription& description = *state->description;
   std::vector<CoarseHull> hulls;
   if (state->kinematics) hulls = coarse_hulls(description, [this] { return cancelled(); });
-  state->choice = choose_links(description, state->rules, hulls, config_);
+  state->choice = choose_links(description, *state->rules, hulls, config_);
   state->links = state->choice.monitored;
   for (const std::string& text : state->choice.warnings) state->warnings.push_back(text);
   if (!state->choice.remarks.empty()) ROS_INFO_STREAM(state->choice.remarks);
@@ -267,6 +270,9 @@ RobotDescription ModelLoader::carry_over_objects(ModelState* state) {
 
 void ModelLoader::load(const std::string& urdf) {
   ModelState state;
+  state.phase = ModelState::Phase::kReading;
+  state.problem = "reading the URDF in '" + config_.robot_description + "'";
+  set_state(state);
   state.description = std::make_shared<const RobotDescription>(
       parse_urdf(urdf, config_.geometry, environment_package_finder(),
                  [this](const std::string& link, const std::string& mesh) {

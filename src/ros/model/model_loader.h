@@ -74,7 +74,7 @@ class ModelLoader {
   bool change_cancelled() const;
   std::string why_cancelled() const;
   bool show_reading(const std::string& link, const std::string& mesh);
-  void read_rules(ModelState* state) const;
+  void read_rules(ModelState* state);
   void choose(ModelState* state) const;
   RobotModelConfig model_config(const ModelState& state) const;
   static void take_robot(const AnytimeModel::Ptr& made, ModelState* state);

@@ -33,7 +33,8 @@ struct ModelState {
   std::vector<std::string> links;     ///< monitored, in URDF order; known from kPacking on
   std::vector<std::string> warnings;  ///< given by packing
   /// Known from kPacking on.
-  CollisionRules rules;  ///< of the SRDF
+  /// Of the SRDF; not null. States share them: there may be a million pairs.
+  std::shared_ptr<const CollisionRules> rules = std::make_shared<const CollisionRules>();
   LinkChoice choice;
   /// Known when ready, and while packing with links that are pending. It holds the links that are
   /// monitored, and others that self-filters and link pairs need.

@@ -66,7 +66,7 @@ PairChoice choose_pairs(const ServerConfig& config,
   PairChoice choice;
   const RobotModel& robot = *model.robot;
   choice.warnings = unknown_names(config, *model.kinematics);
-  const CollisionRules& rules = model.rules;
+  const CollisionRules& rules = *model.rules;
   CollisionRules only_enabled;  // which may be of adjacent links
   only_enabled.enabled = rules.enabled;
   const std::vector<bool> wanted = wanted_links(model);
