@@ -119,7 +119,7 @@ class CycleBenchmark {
         const Frame& frame = trial_.frames[k / kCyclesPerCloud % trial_.frames.size()];
         solids = posed_solids(*trial_.robot, X_FL, known);
         ingest.run(frame.raw(), frame.X_FS, solids, now_.toSec(), source_->cloud(now_));
-        warm_up_.run(*source_, *source_->newest(trial_.robot, now_, 0.0));
+        warm_up_.run(*source_, *source_->newest({trial_.robot, now_, 0.0}));
       }
       now_ += ros::Duration(0.001);
       poses_->set(X_FL);

@@ -1,4 +1,4 @@
-// This part of ProximityServer runs its two threads and publishes their results.
+// This part of ProximityServer runs the cycle and publishes its results.
 
 #include <ros/console.h>
 #include <sensor_msgs/PointCloud2.h>
@@ -9,11 +9,12 @@
 
 #include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
+#include "ros/common/publish.h"
 #include "ros/common/stopwatch.h"
 #include "ros/common/thread_name.h"
 #include "ros/cycle/cycle_message.h"
-#include "ros/input/cloud_source.h"
-#include "ros/input/map_measurement.h"
+#include "ros/input/measurement.h"
+#include "ros/input/sensor_source.h"
 #include "ros/input/world_source.h"
 #include "ros/output/message_invariants.h"
 #include "ros/proximity_server_impl.h"
@@ -25,8 +26,14 @@ namespace {
 // needs.
 constexpr double kLongestWarmPeriod = 0.005;
 
+constexpr std::chrono::milliseconds kMarkerPeriod(40);  // rviz draws no faster
 // [m] Unknown space is drawn as far from the links as this.
 constexpr double kDrawnUnseen = 0.15;
+
+ros::NodeHandle with_queue(ros::NodeHandle nh, CallbackThread* thread) {
+  nh.setCallbackQueue(thread->queue());
+  return nh;
+}
 
 }  // namespace
 
@@ -35,30 +42,36 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
     : config_(config),
       nh_(nh),
       private_nh_(private_nh),
-      results_(private_nh, config),
+      summary_(private_nh, config),
+      marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
       spheres_(private_nh),
       diagnostics_(nh, without_slash(private_nh.getNamespace()), config),
       buffer_(ros::Duration(10.0)),
-      listener_(&buffer_, nh_),
+      listener_(&buffer_, with_queue(nh, &pose_thread_)),
       loader_(config, nh),
-      model_services_(private_nh, &loader_),
       live_(private_nh, config),
-      contact_loader_(config, loader_) {
+      contact_loader_(config, loader_, [this] {  // a request waits, or the node ends
+        return !model_thread_.queue()->isEmpty() || !model_thread_.is_running();
+      }) {
+  model_thread_.start("ist model", [this] {
+    loader_.load_when_due();
+    contact_loader_.pack_when_due();
+  });
+  proximity_ = private_nh_.advertise<ist_proximity::ProximityArray>("proximity", 10);
+  joint_repulsion_ = private_nh_.advertise<ist_proximity::JointRepulsion>("joint_repulsion", 10);
+  markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
   const auto filtered_cloud = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
-  for (const SourceConfig& source : config_.sources) {
-    if (source.type == SourceType::kWorld) {
-      sources_.push_back(std::make_shared<WorldSource>(source, nh_, private_nh_, buffer_));
-      continue;
-    }
-    add_source(source, filtered_cloud);
-  }
-  if (!memories_.empty()) model_services_.offer(private_nh_, memories_);
+  for (const SourceConfig& source : config_.sources) add_source(source, filtered_cloud);
+  model_services_ =
+      std::make_unique<ModelServices>(private_nh_, model_thread_.queue(), &loader_, memories_);
   if (config_.pose_source == PoseSourceKind::kJointStates) {
-    joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
+    const auto on_state = [this] {
       ++joint_states_received_;
       joint_state_period_.note(Clock::now());
       cycle_signal_.notify();
-    });
+    };
+    joint_states_ =
+        std::make_unique<JointStateListener>(&buffer_, with_queue(nh_, &pose_thread_), on_state);
   }
   const auto live = [this] { return live_config(); };
   if (config_.unknown_space != UnknownSpace::kFree) {
@@ -68,31 +81,38 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
         buffer_);
   }
   query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live,
-                                                  unknown_space_.get());
+                                                  unknown_space_.get(),
+                                                  [this] { publish_diagnostics_when_due(); });
   if (config_.self_collision.enabled) {
     self_proximity_ =
         std::make_unique<SelfProximity>(private_nh_, config_, buffer_, joint_states_.get(), live);
     link_pairs_ = std::make_unique<LinkPairService>(private_nh_, config_);
   }
   cycle_thread_ = std::thread(&Impl::run_cycles, this);
-  diagnostics_thread_ = std::thread(&Impl::run_diagnostics, this);
+  pose_thread_.start("ist tf", [this] { buffer_.end_disputes(ros::Time::now()); });
 }
 
 ProximityServer::Impl::~Impl() {
   cycle_signal_.stop();
-  diagnostics_signal_.stop();
   cycle_thread_.join();
-  diagnostics_thread_.join();
+  model_services_.reset();
+  loader_.stop();
+  model_thread_.stop();
+  pose_thread_.stop();
   warm_up_.end();
   query_service_.reset();
   self_proximity_.reset();
   link_pairs_.reset();
   cycle_.reset();
-  joint_states_.reset();  // the listener's thread uses members that are destroyed before it
 }
 
 /// Adds a source, and what it remembers.
 void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Publisher& filtered) {
+  if (config.type == SourceType::kWorld) {
+    inputs_.push_back(std::make_shared<WorldSource>(config, with_queue(nh_, &pose_thread_),
+                                                    private_nh_, buffer_));
+    return sources_.push_back(inputs_.back());
+  }
   std::shared_ptr<SourceMemory> memory;
   if (config.memory.enabled) {
     memory = std::make_shared<SourceMemory>(config, buffer_,
@@ -100,11 +120,12 @@ void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Pu
                                             advertise_map(&private_nh_, "memory/" + config.name));
     memories_.push_back(memory);
   }
-  sources_.push_back(std::make_shared<CloudSource>(
+  inputs_.push_back(std::make_shared<SensorSource>(
       config, nh_, buffer_, filtered, memory,
       [this](const ObstacleSource& source, const SourceSnapshot& fresh) {
         return warm_up_.run(source, fresh);
       }));
+  sources_.push_back(inputs_.back());
   if (!memory) return;
   memory->set_parent(sources_.back().get());
   sources_.push_back(memory);
@@ -153,10 +174,36 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
   failed.problem = "the last cycle failed: " + fault;
   fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
   ++report_.cycles;
+  publish(message, false, live_.get().speed_scale);
+}
+
+/// Publishes a result and what follows from it. Jacobians and markers cost time, and are made for
+/// somebody who listens. The caller holds report_mutex_.
+/// @param is_of_cycle  whether the cycle has made it
+void ProximityServer::Impl::publish(const ist_proximity::ProximityArrayConstPtr& message,
+                                    bool is_of_cycle, const SpeedScaleConfig& speed_scale) {
   spheres_.show_nearness(*message, config_.query.max_distance);
-  results_.publish(
-      message, nullptr, live_.get().speed_scale, [](ist_proximity::JointRepulsion*) {},
-      [] { return MarkerScene(); });
+  const auto self = is_of_cycle && self_proximity_ ? self_proximity_->newest() : nullptr;
+  summary_.publish(*message, self.get(), speed_scale, ros::Time::now());
+  publish_message(proximity_, message);
+  const bool has_cycle = is_of_cycle && cycle_;
+  if (joint_repulsion_.getNumSubscribers() > 0) {
+    ist_proximity::JointRepulsion efforts;
+    efforts.header.stamp = message->header.stamp;
+    efforts.status = message->status;
+    efforts.status_text = message->status_text;
+    if (has_cycle) {
+      cycle_->fill_joint_repulsion(*message, summary_.self_problem(), self.get(), &efforts);
+    }
+    publish_message(joint_repulsion_, efforts);
+  }
+  report_.min_distance = summary_.min_distance();
+  report_.speed_scale = summary_.summary();
+  if (markers_.getNumSubscribers() == 0 || Clock::now() < next_markers_) return;
+  next_markers_ = Clock::now() + kMarkerPeriod;
+  const MarkerScene scene = has_cycle ? cycle_->marker_scene() : MarkerScene();
+  publish_message(markers_, marker_drawer_.draw(*message, scene));
+  ++report_.markers_drawn;
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -188,19 +235,9 @@ void ProximityServer::Impl::run_cycle() {
   last_stamp_ = message->header.stamp;
   assert_invariants(*message, {ros::Time::now(), least_when_clear(config_), live.query.margin});
   Stopwatch watch;
-  spheres_.show_nearness(*message, config_.query.max_distance);
-  const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;
-  const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
-    if (!cycle_) return;
-    cycle_->fill_joint_repulsion(*message, results_.summary().self_problem(), self.get(), efforts);
-  };
-  const auto scene = [&] { return cycle_ ? cycle_->marker_scene() : MarkerScene(); };
-  const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion, scene);
   const std::lock_guard<std::mutex> lock(report_mutex_);
-  if (drawn) ++report_.markers_drawn;
+  publish(message, true, live.speed_scale);
   if (cycle_) report_.parts[kPartPublish].add(watch.lap());
-  report_.min_distance = results_.summary().min_distance();
-  report_.speed_scale = results_.summary().summary();
 }
 
 /// Tells the parts that do not notice a backward jump of the clock themselves.
@@ -209,21 +246,19 @@ void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
   if (now < last_now_) {
     last_stamp_ = ros::Time();
     if (cycle_) cycle_->forget();
-    results_.summary().forget();
+    summary_.forget();
     spheres_.repeat_after_clock_jump();
   }
   last_now_ = now;
 }
 
-void ProximityServer::Impl::run_diagnostics() {
-  name_thread("ist diagnostics");
-  Clock::time_point last = Clock::now();
-  while (diagnostics_signal_.sleep_until(last + std::chrono::seconds(1))) {
-    last = Clock::now();
-    const std::string fault = exception_of([this] { publish_diagnostics(); });
-    if (fault.empty()) continue;
-    ROS_ERROR_STREAM_THROTTLE(5.0, "the diagnostics are not published: " << fault);
-  }
+void ProximityServer::Impl::publish_diagnostics_when_due() {
+  const Clock::time_point now = Clock::now();
+  if (now < next_diagnostics_) return;
+  next_diagnostics_ = now + std::chrono::seconds(1);
+  const std::string fault = exception_of([this] { publish_diagnostics(); });
+  if (fault.empty()) return;
+  ROS_ERROR_STREAM_THROTTLE(5.0, "the diagnostics are not published: " << fault);
 }
 
 void ProximityServer::Impl::publish_diagnostics() {

@@ -11,8 +11,10 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "ist_proximity/ros/proximity_server.h"
+#include "ros/common/callback_thread.h"
 #include "ros/common/stop_signal.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/cycle/scene_warm_up.h"
@@ -21,8 +23,9 @@
 #include "ros/model/contact_loader.h"
 #include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
+#include "ros/output/markers.h"
 #include "ros/output/message_pool.h"
-#include "ros/output/result_publisher.h"
+#include "ros/output/speed_scale_publisher.h"
 #include "ros/output/sphere_publisher.h"
 #include "ros/parameters/live_parameters.h"
 #include "ros/parameters/parameters.h"
@@ -39,14 +42,11 @@
 
 namespace ist {
 
-/// Owns all parts and runs two threads: the cycle and the diagnostics.
+/// Owns all parts and runs the cycle. doc/architecture.md lists the threads.
 ///
 /// The cycle takes the newest poses and clouds, queries and publishes, and waits for nothing. It
 /// runs at ~rate of the wall clock, so that a paused /clock does not silence it, or with
-/// pose_source joint_states once for each joint state, and ten times a second while none come. The
-/// diagnostics thread runs once a second. The parts have threads of their own: one per source,
-/// ~query, ~self_proximity, the live parameters, the model and contact loaders, the listeners of tf
-/// and joint_states.
+/// pose_source joint_states once for each joint state, and ten times a second while none come.
 class ProximityServer::Impl {
  public:
   Impl(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const ServerConfig& config);
@@ -65,6 +65,8 @@ class ProximityServer::Impl {
   void run_cycle();
   void run_cycle_guarded();
   void publish_failure(const std::string& fault);
+  void publish(const ist_proximity::ProximityArrayConstPtr& message, bool is_of_cycle,
+               const SpeedScaleConfig& speed_scale);
   void notice_clock_jump(const ros::Time& now);
   void take_model();
   void choose_counted_links();
@@ -72,35 +74,42 @@ class ProximityServer::Impl {
   void refine_model(std::shared_ptr<const ModelState> model);
   void set_source_targets(const QueryConfig& query);
   double largest_extent() const;
-  void run_diagnostics();
+  void publish_diagnostics_when_due();
   void publish_diagnostics();
   LiveConfig live_config() const;
   double period() const;
 
   const ServerConfig config_;
   ros::NodeHandle nh_, private_nh_;
-  ResultPublisher results_;
+  ros::Publisher proximity_, joint_repulsion_, markers_;
+  SpeedScalePublisher summary_;
+  ProximityMarkers marker_drawer_;
   SpherePublisher spheres_;
   DiagnosticsPublisher diagnostics_;
   TransformBuffer buffer_;
+  CallbackThread pose_thread_;  ///< of tf and the joint states
   TransformListener listener_;
   SourceMemories memories_;
   SceneWarmUp warm_up_{sources_};  ///< used by the threads of the sources
   CloudSources sources_;
+  std::vector<std::shared_ptr<Source>> inputs_;       ///< those of them that are no memories
   std::unique_ptr<UnknownSpaceWatch> unknown_space_;  ///< null with ~unknown_space free
+  CallbackThread model_thread_;                       ///< loads, packs volumes, attaches
   ModelLoader loader_;
-  ModelServices model_services_;
   LiveParameters live_;
   ContactLoader contact_loader_;
+  std::unique_ptr<ModelServices> model_services_;
 
   StopSignal cycle_signal_;  ///< joint states are its events
-  StopSignal diagnostics_signal_;
   std::atomic<std::uint64_t> joint_states_received_{0};
   UsualPeriod joint_state_period_{kLongestPeriod};
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   std::mutex report_mutex_;
-  CycleReport report_;  ///< shared by both threads
+  CycleReport report_;  ///< of the cycle, for the diagnostics
+
+  // Used by the thread of ~query alone.
+  Clock::time_point next_diagnostics_ = Clock::now() + std::chrono::seconds(1);
 
   // Used by the cycle thread alone.
   std::shared_ptr<const ModelState> model_;
@@ -113,11 +122,12 @@ class ProximityServer::Impl {
   double region_radius_ = 0.0;  ///< [m] the largest of this robot
   ros::Time last_now_;
   ros::Time last_stamp_;  ///< of the last ~proximity
+  Clock::time_point next_markers_;
 
   std::unique_ptr<QueryService> query_service_;
   std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
   std::unique_ptr<LinkPairService> link_pairs_;    ///< the same
-  std::thread cycle_thread_, diagnostics_thread_;
+  std::thread cycle_thread_;
 };
 
 }  // namespace ist

@@ -65,7 +65,8 @@ void ProximityServer::Impl::choose_counted_links() {
   const CountedLinks before = std::move(counted_);
   counted_ = counted_links(*model_, config_, root_stands_still_);
   const CountedLinks self = counted_links(*with_paired(model_), config_, root_stands_still_);
-  results_.set_links(counted_, self);
+  summary_.set_links(counted_, self);
+  marker_drawer_.set_counts(counted_.counts);
   std::string problem = self.problem;
   if (model_->robot) {
     const std::vector<std::string> missing =
@@ -132,7 +133,7 @@ void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
     // Clouds that were cropped before serve finer packings, too.
     region_radius_ = region.radius = std::max(region.radius, region_radius_);
   }
-  for (const auto& source : sources_)
+  for (const auto& source : inputs_)
     source->set_model(model_->robot, fixed_frame, region, model_->filters);
 }
 

@@ -13,25 +13,21 @@ namespace {
 
 constexpr double kStart = 1000.0;  // [s]
 
-class Stub : public Measurement {
- public:
-  using Measurement::Measurement;
-  void ingest(const Placement&, Ingest*, CloudSnapshot*) const override {}
-};
-
 // A measurement with a stamp `after` seconds from the start.
 std::shared_ptr<const Measurement> stub(double after, std::size_t bytes = 1) {
-  std_msgs::Header header;
-  header.stamp = ros::Time(kStart + after);
+  const ros::Time stamp(kStart + after);
   ros::Time::init();
-  ros::Time::setNow(header.stamp);
-  return std::make_shared<Stub>(header, bytes);
+  ros::Time::setNow(stamp);
+  auto measurement = std::make_shared<Measurement>();
+  measurement->header.stamp = stamp;
+  measurement->bytes = bytes;
+  return measurement;
 }
 
 std::vector<double> stamps(const MeasurementQueue& queue) {
   std::vector<double> all;
   for (std::size_t i = 0; i < queue.size(); ++i) {
-    all.push_back(queue[i].header().stamp.toSec() - kStart);
+    all.push_back(queue[i].header.stamp.toSec() - kStart);
   }
   return all;
 }
@@ -53,7 +49,7 @@ Outcome run(double rate, double late, std::size_t bytes) {
     queue.drop_overdue(ros::Time(kStart + now), 1.0);
     const std::size_t ready = queue.newest_ready([&](const Measurement& measurement) {
       ++outcome.asked;
-      return measurement.header().stamp.toSec() - kStart <= now - late + 1e-6;
+      return measurement.header.stamp.toSec() - kStart <= now - late + 1e-6;
     });
     if (ready == queue.size()) continue;
     ++outcome.used;
@@ -107,7 +103,7 @@ TEST(MeasurementQueue, keepsToItsMemory) {
 TEST(MeasurementQueue, isInTheOrderOfStamps) {
   MeasurementQueue queue;
   for (const double after : {0.3, 0.1, 0.2, 0.0}) queue.add(stub(after));
-  EXPECT_TRUE(queue.newest().header().stamp == ros::Time(kStart + 0.3));
+  EXPECT_TRUE(queue.newest().header.stamp == ros::Time(kStart + 0.3));
   queue.drop_until(1);
   ASSERT_EQ(queue.size(), 2U);
   EXPECT_NEAR(stamps(queue)[0], 0.2, 1e-6);
@@ -128,7 +124,7 @@ TEST(MeasurementQueue, findsTheNewestThatIsReady) {
     for (int i = 0; i < size; ++i) queue.add(stub(i));
     for (int count = 0; count <= size; ++count) {
       const std::size_t found = queue.newest_ready([&](const Measurement& measurement) {
-        return measurement.header().stamp < ros::Time(kStart + count);
+        return measurement.header.stamp < ros::Time(kStart + count);
       });
       EXPECT_EQ(found, static_cast<std::size_t>(count > 0 ? count - 1 : size)) << "of " << size;
     }

@@ -50,9 +50,10 @@ ProximityArray message() {
   all.sources.resize(1);
   all.sources[0].name = "camera";
   all.links.push_back(unknown_link("unknown"));
-  all.links.push_back(to_message("clear", clear, none, Wrench::zero(), {}, ""));
-  all.links.push_back(to_message("near", measured(0.3), none, Wrench::zero(), {}, "camera"));
-  all.links.push_back(to_message("contact", measured(-0.1), none, Wrench::unknown(), {}, "camera"));
+  all.links.resize(4);
+  assign_link("clear", clear, none, Wrench::zero(), {}, "", &all.links[1]);
+  assign_link("near", measured(0.3), none, Wrench::zero(), {}, "camera", &all.links[2]);
+  assign_link("contact", measured(-0.1), none, Wrench::unknown(), {}, "camera", &all.links[3]);
   return all;
 }
 

@@ -132,7 +132,7 @@ class PenetrationTest(unittest.TestCase):
         # A volume that something in contact waits for does not wait for the rest of the machine.
         pid = node.process.pid
         usual = os.getpriority(os.PRIO_PROCESS, pid)
-        self.assertEqual(nice_of(pid, "ist contact"), usual)
+        self.assertEqual(nice_of(pid, "ist model"), usual)
         self.assertGreater(nice_of(pid, "ist packing"), usual)
 
     def test_another_robot_while_volumes_are_packed(self):

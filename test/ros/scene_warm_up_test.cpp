@@ -42,7 +42,7 @@ class SceneWarmUpTest : public ::testing::Test {
       *stated->cloud(ros::Time(1.0)) = plane(1.0);
       sources_.push_back(std::move(stated));
     }
-    scene_.model = robot_;
+    scene_.request.model = robot_;
     scene_.sources = {0, 1};
     scene_.X_FL.assign(2, Eigen::Isometry3d::Identity());
     scene_.known.assign(2, true);
@@ -53,7 +53,7 @@ class SceneWarmUpTest : public ::testing::Test {
     return std::make_unique<CoherentQueries>(robot_, QueryConfig());
   }
   const CloudSnapshot& cloud(test::StatedSource* source) const {
-    return source->newest(robot_, ros::Time(), 0.0)->cloud;
+    return source->newest(scene_.request)->cloud;
   }
   std::uint64_t key(const CloudSnapshot& first) const {
     return obstacles_key({&first, &cloud(second_)});

@@ -10,7 +10,7 @@
 
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/link_poses.h"
-#include "ros/input/obstacle_source.h"
+#include "ros/input/source.h"
 #include "ros/model/model_state.h"
 #include "ros/poses/pose_source.h"
 
@@ -26,19 +26,15 @@ class StatedSource : public ObstacleSource {
   }
 
   void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                 const RegionOfInterest& region,
-                 const std::vector<bool>& /*filters*/ = {}) override {
+                 const RegionOfInterest& region) {
     snapshot_->model = std::move(model);
     snapshot_->fixed_frame = fixed_frame;
     snapshot_->cloud.region = region;
   }
-  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& /*model*/,
-                               const ros::Time& /*time*/, double /*max_age*/) override {
+  const SourceSnapshot* newest(const SnapshotRequest& /*request*/) override {
     return snapshot_.get();
   }
-  std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& /*model*/,
-                                              const ros::Time& /*time*/,
-                                              double /*max_age*/) override {
+  std::shared_ptr<const SourceSnapshot> share(const SnapshotRequest& /*request*/) override {
     return snapshot_;
   }
   void report(SourceReport* report) override {

@@ -26,15 +26,14 @@ class CallbackThread {
   ros::CallbackQueue* queue() { return &queue_; }
 
   /// Starts the thread.
-  /// @param after_callbacks  called after each round of callbacks, 20 times a second or more often
-  void start(
-      const std::string& name, std::function<void()> after_callbacks = [] {}) {
-    thread_ = std::thread([this, name, after_callbacks = std::move(after_callbacks)] {
+  /// @param meanwhile  called between the rounds of callbacks, 20 times a second or more often
+  void start(const std::string& name, std::function<void()> meanwhile) {
+    thread_ = std::thread([this, name, meanwhile = std::move(meanwhile)] {
       name_thread(name);
       while (running_) {
         const std::string fault = exception_of([&] {
+          meanwhile();
           queue_.callAvailable(ros::WallDuration(0.05));
-          after_callbacks();
         });
         if (fault.empty()) continue;
         ROS_ERROR_STREAM_THROTTLE(5.0, "a message or request to thread '"

@@ -19,18 +19,26 @@ std::size_t parent_of(const CloudSources& sources, std::size_t source) {
   return source;
 }
 
+/// Whether what a source has counts as an obstacle: where others vouch for what is free, also what
+/// is left of an incomplete source, and what a silent one remembers.
+bool is_obstacle(std::size_t source, const StatusInput& status) {
+  const Status& own = status.source_statuses[source];
+  const SourceReport& report = status.sources[source];
+  const bool is_incomplete =
+      own.code == ist_proximity::ProximityArray::NO_CLOUD && !report.incomplete.empty();
+  return own.ok() || is_incomplete || report.is_memory;
+}
+
 }  // namespace
 
 void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
-                            const std::shared_ptr<const RobotModel>& model,
-                            const ros::Time& poses_stamp, double pose_timeout,
-                            StatusInput* status) {
+                            const SnapshotRequest& request, StatusInput* status) {
   status->sources.resize(sources.size());
   status->source_statuses.resize(sources.size());
   selected_.clear();
   held_.clear();
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    const SourceSnapshot* snapshot = newest(sources, i, model, poses_stamp, pose_timeout, *status);
+    const SourceSnapshot* snapshot = newest(sources, i, request, *status);
     SourceReport& report = status->sources[i];
     sources[i]->report(&report);
     if (snapshot) {
@@ -79,32 +87,14 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
 /// is ever combined with what is hidden from another one. Beside a cloud that is not used, all that
 /// its source remembers is an obstacle.
 const SourceSnapshot* CloudSelection::newest(const CloudSources& sources, std::size_t source,
-                                             const std::shared_ptr<const RobotModel>& model,
-                                             const ros::Time& poses_stamp, double pose_timeout,
+                                             const SnapshotRequest& request,
                                              const StatusInput& status) {
   const std::size_t parent = parent_of(sources, source);
   if (parent != source && selected_[parent] != nullptr && is_obstacle(parent, status)) {
     return selected_[parent]->memory.get();
   }
-  return take_newest(sources[source].get(), model, poses_stamp, pose_timeout);
-}
-
-/// Whether what a source has counts as an obstacle: where others vouch for what is free, also what
-/// is left of an incomplete source, and what a silent one remembers.
-bool CloudSelection::is_obstacle(std::size_t source, const StatusInput& status) const {
-  const Status& own = status.source_statuses[source];
-  const SourceReport& report = status.sources[source];
-  const bool is_incomplete =
-      own.code == ist_proximity::ProximityArray::NO_CLOUD && !report.incomplete.empty();
-  return own.ok() || is_incomplete || report.is_memory;
-}
-
-const SourceSnapshot* CloudSelection::take_newest(ObstacleSource* source,
-                                                  const std::shared_ptr<const RobotModel>& model,
-                                                  const ros::Time& poses_stamp,
-                                                  double pose_timeout) {
-  if (reader_ == Reader::kOnly) return source->newest(model, poses_stamp, pose_timeout);
-  held_.push_back(source->share(model, poses_stamp, pose_timeout));
+  if (reader_ == Reader::kOnly) return sources[source]->newest(request);
+  held_.push_back(sources[source]->share(request));
   return held_.back().get();
 }
 

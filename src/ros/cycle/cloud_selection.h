@@ -10,7 +10,7 @@
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "ros/input/obstacle_source.h"
+#include "ros/input/source.h"
 #include "ros/status/status.h"
 
 namespace ist {
@@ -24,13 +24,10 @@ class CloudSelection {
 
   explicit CloudSelection(Reader reader) : reader_(reader) {}
 
-  /// @param model         that snapshots must be made with
-  /// @param poses_stamp   of the link poses; maps are placed at that time
-  /// @param pose_timeout  [s] allowed age of a map's pose
-  /// @param status        receives the sources and their statuses
-  void update(const ros::Time& now, const CloudSources& sources,
-              const std::shared_ptr<const RobotModel>& model, const ros::Time& poses_stamp,
-              double pose_timeout, StatusInput* status);
+  /// @param request  its time is that of the link poses
+  /// @param status   receives the sources and their statuses
+  void update(const ros::Time& now, const CloudSources& sources, const SnapshotRequest& request,
+              StatusInput* status);
 
   /// Takes other poses of the same worlds.
   /// @param worlds  valid until the next update()
@@ -64,13 +61,7 @@ class CloudSelection {
 
  private:
   const SourceSnapshot* newest(const CloudSources& sources, std::size_t source,
-                               const std::shared_ptr<const RobotModel>& model,
-                               const ros::Time& poses_stamp, double pose_timeout,
-                               const StatusInput& status);
-  bool is_obstacle(std::size_t source, const StatusInput& status) const;
-  const SourceSnapshot* take_newest(ObstacleSource* source,
-                                    const std::shared_ptr<const RobotModel>& model,
-                                    const ros::Time& poses_stamp, double pose_timeout);
+                               const SnapshotRequest& request, const StatusInput& status);
 
   const Reader reader_;
   std::vector<const SourceSnapshot*> selected_;

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "ist_proximity/robot/robot_model.h"
-#include "ros/input/obstacle_source.h"
-#include "ros/input/source_snapshot.h"
+#include "ros/input/source.h"
 #include "ros/model/model_state.h"
 #include "ros/poses/pose_source.h"
 #include "ros/status/cycle_report.h"

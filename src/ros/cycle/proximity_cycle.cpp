@@ -70,7 +70,8 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   message->poses_time = watch.lap();
   const TimePoint begin = Stopwatch::Clock::now();
   status_input_.deadline = DeadlineCost();
-  selection_.update(now, sources, model_->robot, poses_.stamp, pose_timeout_, &status_input_);
+  asked_.request = {model_->robot, poses_.stamp, pose_timeout_};
+  selection_.update(now, sources, asked_.request, &status_input_);
   take_warm_queries();
   describe_pose_problems(transform_problem);
   const double preparation = watch.lap();
@@ -139,10 +140,7 @@ void ProximityCycle::take_warm_queries() {
 
 void ProximityCycle::note_asked(const LiveConfig& config) {
   if (warm_up_ == nullptr) return;
-  asked_.model = model_->robot;
   asked_.sources = selection_.cloud_sources();
-  asked_.stamp = poses_.stamp;
-  asked_.pose_timeout = pose_timeout_;
   asked_.X_FL = poses_.X_FL;
   asked_.known = known_;
   asked_.query = config.query;

@@ -19,7 +19,7 @@
 #include "ros/cycle/scene_warm_up.h"
 #include "ros/cycle/unknown_space_query.h"
 #include "ros/cycle/world_answers.h"
-#include "ros/input/obstacle_source.h"
+#include "ros/input/source.h"
 #include "ros/model/model_state.h"
 #include "ros/output/joint_repulsion.h"
 #include "ros/output/markers.h"

@@ -105,7 +105,7 @@ const SourceSnapshot* SceneWarmUp::share(const ObstacleSource& source) {
       sources_.begin(), sources_.end(),
       [shared](const std::shared_ptr<ObstacleSource>& s) { return s.get() == shared; });
   if (found == sources_.end()) return nullptr;
-  held_.push_back((*found)->share(scene_.model, scene_.stamp, scene_.pose_timeout));
+  held_.push_back((*found)->share(scene_.request));
   const SourceSnapshot* const snapshot = held_.back().get();
   if (snapshot == nullptr || shared == &source) return snapshot;
   return snapshot->memory.get();

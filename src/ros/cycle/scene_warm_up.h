@@ -9,18 +9,16 @@
 #include <vector>
 
 #include "internal/repulsion/coherent_queries.h"
-#include "ros/input/obstacle_source.h"
+#include "ros/input/source.h"
 
 namespace ist {
 
 /// The question of a cycle.
 struct AskedScene {
-  std::shared_ptr<const RobotModel> model;  ///< that snapshots are made with
-  std::vector<int> sources;                 ///< of the clouds, in their order
-  ros::Time stamp;                          ///< of the poses
-  double pose_timeout = 0.0;                ///< [s]
-  std::vector<Eigen::Isometry3d> X_FL;      ///< by link of the robot
-  std::vector<bool> known;                  ///< the same
+  SnapshotRequest request;
+  std::vector<int> sources;             ///< of the clouds, in their order
+  std::vector<Eigen::Isometry3d> X_FL;  ///< by link of the robot
+  std::vector<bool> known;              ///< the same
   QueryConfig query;
   RepulsionConfig repulsion;
 };

@@ -1,12 +1,10 @@
-#include "ros/input/image_measurement.h"
-
 #include <ros/console.h>
 
 #include <algorithm>
 #include <utility>
 
 #include "ros/common/frame_name.h"
-#include "ros/input/cloud_measurement.h"
+#include "ros/input/measurement.h"
 
 namespace ist {
 namespace {
@@ -38,13 +36,6 @@ bool is_same_camera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraI
 
 }  // namespace
 
-std::string sibling_camera_info(const std::string& image_topic) {
-  return image_topic.substr(0, image_topic.rfind('/') + 1) + "camera_info";
-}
-
-DepthCamera::DepthCamera(std::string source, std::string topic)
-    : source_(std::move(source)), topic_(std::move(topic)) {}
-
 void DepthCamera::take(const sensor_msgs::CameraInfo& message) {
   if (has_come_ && is_same_camera(message, newest_)) return;
   newest_ = message;
@@ -59,14 +50,15 @@ void DepthCamera::take(const sensor_msgs::CameraInfo& message) {
                 "points are off where they are not; use a rectified topic (image_rect)"
           : "";
   if (!doubt.empty() && doubt_.empty()) {
-    ROS_WARN_STREAM("source '" << source_ << "': " << doubt);
+    ROS_WARN_STREAM("source '" << config_.name << "': " << doubt);
   }
   doubt_ = doubt;
 }
 
+/// Why images cannot be used; empty when they can.
 std::string DepthCamera::fault(const std::string& frame_id) const {
   if (!has_come_) {
-    return "no sensor_msgs/CameraInfo has come on " + topic_ + "; set ~sources/" + source_ +
+    return "no sensor_msgs/CameraInfo has come on " + topic_ + "; set ~sources/" + config_.name +
            "/camera_info to its topic";
   }
   if (!fault_.empty()) return "malformed camera_info on " + topic_ + ": " + fault_;
@@ -78,12 +70,10 @@ std::string DepthCamera::fault(const std::string& frame_id) const {
   return "";
 }
 
-Received read_image(const sensor_msgs::ImageConstPtr& message, const DepthCamera& camera,
-                    double unit, std::size_t max_points,
-                    const std::shared_ptr<NoiseFilter>& noise) {
+Measurement DepthCamera::read(const sensor_msgs::ImageConstPtr& message) const {
   const std_msgs::Header& header = message->header;
-  std::string fault = camera.fault(header.frame_id);
-  if (!fault.empty()) return {header, fault, nullptr};
+  std::string fault = this->fault(header.frame_id);
+  if (!fault.empty()) return faulty(header, fault);
   DepthImage image;
   image.encoding = message->encoding;
   image.width = message->width;
@@ -92,13 +82,14 @@ Received read_image(const sensor_msgs::ImageConstPtr& message, const DepthCamera
   image.is_bigendian = message->is_bigendian != 0;
   image.data = message->data.data();
   image.data_size = message->data.size();
-  image.unit = unit;
+  image.unit = config_.depth_unit;
   RawCloud raw;
-  fault = check_depth_image(image, camera.rays(), &raw, max_points);
-  if (!fault.empty()) return {header, "malformed image: " + fault, nullptr};
+  fault = check_depth_image(image, rays_, &raw, config_.ingest.max_points);
+  if (!fault.empty()) return faulty(header, "malformed image: " + fault);
   raw.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
-  return {header, "", make_cloud_measurement(header, raw, message->data.size(), noise),
-          camera.doubt()};
+  Measurement measurement = measure_points(header, raw, message->data.size(), noise_);
+  measurement.doubt = doubt_;
+  return measurement;
 }
 
 }  // namespace ist

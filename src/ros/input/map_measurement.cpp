@@ -1,5 +1,3 @@
-#include "ros/input/map_measurement.h"
-
 #include <ros/serialization.h>
 #include <topic_tools/shape_shifter.h>
 
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/octree.h"
+#include "ros/input/measurement.h"
 
 namespace ist {
 namespace {
@@ -27,42 +26,26 @@ topic_tools::ShapeShifter shape() {
   return message;
 }
 
-namespace ser = ros::serialization;
-
 // A map stays in its own frame, so it waits for no transform; queries look its pose up.
-class MapMeasurement : public Measurement {
- public:
-  MapMeasurement(const std_msgs::Header& header, const Octree& octree,
-                 std::chrono::steady_clock::time_point begin)
-      : Measurement(header, octree.occupied.size() * sizeof(octree.occupied[0])) {
-    auto index = std::make_shared<BoxIndex>();
-    index->build(octree.occupied);
-    index_ = index;
-    received_ = static_cast<std::uint32_t>(octree.occupied.size() + octree.free);
-    took_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  }
-
-  std::vector<ros::Time> instants() const override { return {}; }
-
-  void ingest(const Placement& /*placement*/, Ingest* /*ingest*/,
-              CloudSnapshot* snapshot) const override {
-    snapshot->boxes = index_;
-    snapshot->counts = IngestCounts();
-    snapshot->counts.received = received_;
-    snapshot->counts.used = static_cast<std::uint32_t>(index_->size());
-    snapshot->stamp = header().stamp.toSec();
-    snapshot->ingest_time = took_;
-  }
-
- private:
-  std::shared_ptr<const BoxIndex> index_;
-  std::uint32_t received_;
-  double took_;
-};
-
-Received make_received(const std_msgs::Header& header, const Octree& octree,
-                       std::chrono::steady_clock::time_point begin) {
-  return {header, "", std::make_shared<MapMeasurement>(header, octree, begin)};
+Measurement measure_map(const std_msgs::Header& header, const Octree& octree,
+                        std::chrono::steady_clock::time_point begin) {
+  auto index = std::make_shared<BoxIndex>();
+  index->build(octree.occupied);
+  IngestCounts counts;
+  counts.received = static_cast<std::uint32_t>(octree.occupied.size() + octree.free);
+  counts.used = static_cast<std::uint32_t>(index->size());
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  Measurement measurement;
+  measurement.header = header;
+  measurement.take_in = [index, counts, stamp = header.stamp.toSec(), took](
+                            const Placement& /*placement*/, Ingest* /*ingest*/,
+                            CloudSnapshot* snapshot) {
+    snapshot->boxes = index;
+    snapshot->counts = counts;
+    snapshot->stamp = stamp;
+    snapshot->ingest_time = took.count();
+  };
+  return measurement;
 }
 
 // Reads Header header, bool binary, string id, float64 resolution, int8[] data. Throws where the
@@ -82,47 +65,45 @@ void parse(ser::IStream* stream, std_msgs::Header* header, OctreeData* data) {
 
 }  // namespace
 
-Received read_map(const topic_tools::ShapeShifter& message, const OctreeLimits& limits) {
+Measurement read_map(const topic_tools::ShapeShifter& message, const OctreeLimits& limits) {
   const auto begin = std::chrono::steady_clock::now();
-  Received received;
+  std_msgs::Header header;
   if (message.getDataType() != message_type(SourceType::kMap)) {
     // The header of an unknown type cannot be read.
-    received.header.stamp = ros::Time::now();
-    received.header.frame_id = "?";
-    received.fault =
-        "a " + message.getDataType() + " comes in, it must be a " + message_type(SourceType::kMap);
-    return received;
+    header.stamp = ros::Time::now();
+    header.frame_id = "?";
+    return faulty(header, "a " + message.getDataType() + " comes in, it must be a " +
+                              message_type(SourceType::kMap));
   }
   OctreeData data;
   Octree octree;
+  std::string fault;
   try {
     std::vector<std::uint8_t> bytes(message.size());
     ser::OStream out(bytes.data(), message.size());
     message.write(out);
     ser::IStream in(bytes.data(), message.size());
-    parse(&in, &received.header, &data);
-    received.fault = read_octree(data, &octree, limits);
-    if (received.fault.empty()) return make_received(received.header, octree, begin);
+    parse(&in, &header, &data);
+    fault = read_octree(data, &octree, limits);
+    if (fault.empty()) return measure_map(header, octree, begin);
   } catch (const std::exception& error) {  // the stream ends too early, or there is no memory
-    received.fault = error.what();
+    fault = error.what();
   }
-  received.fault = "malformed map: " + received.fault;
-  return received;
+  return faulty(header, "malformed map: " + fault);
 }
 
-Received read_map_file(const std::string& path, const std::string& frame_id,
-                       const OctreeLimits& limits) {
+Measurement read_map_file(const std::string& path, const std::string& frame_id,
+                          const OctreeLimits& limits) {
   const auto begin = std::chrono::steady_clock::now();
-  Received received;
-  received.header.frame_id = frame_id;
+  std_msgs::Header header;
+  header.frame_id = frame_id;
   Octree octree;
   try {
-    received.fault = read_octree_file(path, &octree, limits);
-    if (received.fault.empty()) return make_received(received.header, octree, begin);
+    const std::string fault = read_octree_file(path, &octree, limits);
+    return fault.empty() ? measure_map(header, octree, begin) : faulty(header, fault);
   } catch (const std::exception& error) {
-    received.fault = "map file '" + path + "' cannot be read: " + error.what() + ".";
+    return faulty(header, "map file '" + path + "' cannot be read: " + error.what() + ".");
   }
-  return received;
 }
 
 ros::Publisher advertise_map(ros::NodeHandle* nh, const std::string& topic) {

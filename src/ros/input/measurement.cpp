@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <boost/function.hpp>
+#include <boost/make_shared.hpp>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
+#include "internal/cloud/point_bvh.h"
 #include "ros/common/eigen_conversion.h"
-#include "ros/input/cloud_measurement.h"
-#include "ros/input/image_measurement.h"
-#include "ros/input/map_measurement.h"
 #include "ros/input/receive_pool.h"
 
 namespace ist {
@@ -60,20 +60,22 @@ std::uint64_t content_of(const topic_tools::ShapeShifter& /*map*/, const SourceC
   return 0;
 }
 
+using Receiver = std::function<void(const std::function<Measurement()>&)>;
 template <typename Message>
 using Factory = boost::function<boost::shared_ptr<Message>()>;
 
 // @param make  makes the messages to receive into
 template <typename Message, typename Read>
 ros::Subscriber subscribe_as(const SourceConfig& config, ros::NodeHandle* nh,
-                             const ReadingBegins& begin, const Receiver& receive, const Read& read,
+                             const Receiver& receive, const Read& read,
                              const Factory<Message>& make = ros::DefaultMessageCreator<Message>()) {
   const boost::function<void(const boost::shared_ptr<const Message>&)> callback =
-      [begin, receive, read, config](const boost::shared_ptr<const Message>& message) {
-        begin();
-        Received received = read(message);
-        received.content = content_of(*message, config);
-        receive(received);
+      [receive, read, config](const boost::shared_ptr<const Message>& message) {
+        receive([&] {
+          Measurement measurement = read(message);
+          measurement.content = content_of(*message, config);
+          return measurement;
+        });
       };
   ros::SubscribeOptions options;
   options.init<Message>(config.topic, kQueueSize, callback, make);
@@ -114,55 +116,129 @@ IngestConfig ingest_config(const SourceConfig& config) {
   return ingest;
 }
 
-Subscription subscribe(const SourceConfig& config, ros::NodeHandle* nh, const ReadingBegins& begin,
-                       const Receiver& receive) {
-  Subscription subscription;
+Measurement faulty(const std_msgs::Header& header, const std::string& fault) {
+  Measurement measurement;
+  measurement.header = header;
+  measurement.fault = fault;
+  return measurement;
+}
+
+Measurement measure_points(const std_msgs::Header& header, const RawCloud& points,
+                           std::size_t bytes, const std::shared_ptr<NoiseFilter>& noise) {
+  Measurement measurement;
+  measurement.header = header;
+  measurement.bytes = bytes;
+  measurement.instants = {header.stamp};
+  measurement.points = points;
+  measurement.take_in = [points, noise, stamp = header.stamp.toSec()](
+                            const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) {
+    const auto begin = std::chrono::steady_clock::now();
+    std::uint32_t dropped = 0;
+    const RawCloud cloud =
+        noise ? noise->run(points, ingest->config().max_range, &dropped) : points;
+    const std::chrono::duration<double> filtering = std::chrono::steady_clock::now() - begin;
+    ingest->run(cloud, placement.X_FS, placement.robot, stamp, snapshot, placement.paddings);
+    snapshot->counts.noise = dropped;
+    snapshot->counts.not_a_number -= dropped;
+    snapshot->ingest_time += filtering.count();
+  };
+  return measurement;
+}
+
+Measurement read_cloud(const sensor_msgs::PointCloud2ConstPtr& message, std::size_t max_points,
+                       const std::shared_ptr<NoiseFilter>& noise) {
+  CloudLayout layout;
+  for (const sensor_msgs::PointField& field : message->fields) {
+    layout.fields.push_back({field.name, field.offset, field.datatype, field.count});
+  }
+  layout.width = message->width;
+  layout.height = message->height;
+  layout.point_step = message->point_step;
+  layout.row_step = message->row_step;
+  layout.is_bigendian = message->is_bigendian;
+  layout.data = message->data.data();
+  layout.data_size = message->data.size();
+  RawCloud raw;
+  const std::string fault = check_layout(layout, &raw, max_points);
+  if (!fault.empty()) return faulty(message->header, "malformed cloud: " + fault);
+  raw.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
+  return measure_points(message->header, raw, message->data.size(), noise);
+}
+
+sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros::Time& stamp,
+                                       const std::string& fixed_frame) {
+  auto message = boost::make_shared<sensor_msgs::PointCloud2>();
+  message->header.stamp = stamp;
+  message->header.frame_id = fixed_frame;
+  const char* names[] = {"x", "y", "z"};
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    sensor_msgs::PointField field;
+    field.name = names[i];
+    field.offset = 4 * i;
+    field.datatype = sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    message->fields.push_back(field);
+  }
+  message->height = 1;
+  message->width = static_cast<std::uint32_t>(snapshot.index.size());
+  message->point_step = 12;
+  message->row_step = message->point_step * message->width;
+  message->is_dense = true;
+  message->data.resize(message->row_step);
+
+  std::uint8_t* out = message->data.data();
+  const Eigen::Isometry3d& X_FO = snapshot.index.X_FO();
+  PointTile scratch;
+  const PointBvh& points = snapshot.index.bvh();
+  for (std::size_t number = 0; number < points.tile_count(); ++number) {
+    const PointTile& tile = points.tile(number, &scratch);
+    for (int i = 0; i < tile.count; ++i) {
+      const Eigen::Vector3f p_F = (X_FO * tile.point(i)).cast<float>();
+      std::memcpy(out, p_F.data(), 3 * sizeof(float));
+      out += 3 * sizeof(float);
+    }
+  }
+  return message;
+}
+
+std::vector<ros::Subscriber> subscribe(const SourceConfig& config, ros::NodeHandle* nh,
+                                       const Receiver& receive) {
   if (config.type == SourceType::kScan) {
     IngestConfig ranges = config.ingest;
     ranges.max_range = std::min(ranges.max_range, kFarthestPoint);
-    const ScanLimits limits = config.scan;
-    subscription.messages = subscribe_as<sensor_msgs::LaserScan>(
-        config, nh, begin, receive,
-        [ranges, limits](const sensor_msgs::LaserScanConstPtr& message) {
+    return {subscribe_as<sensor_msgs::LaserScan>(
+        config, nh, receive, [ranges, limits = config.scan](const auto& message) {
           return read_scan(message, ranges, limits);
-        });
-    return subscription;
+        })};
   }
   if (config.type == SourceType::kMap) {
-    const OctreeLimits limits = config.map;
-    subscription.messages = subscribe_as<topic_tools::ShapeShifter>(
-        config, nh, begin, receive, [limits](const topic_tools::ShapeShifter::ConstPtr& message) {
-          return read_map(*message, limits);
-        });
-    return subscription;
+    return {subscribe_as<topic_tools::ShapeShifter>(
+        config, nh, receive,
+        [limits = config.map](const auto& message) { return read_map(*message, limits); })};
   }
-  const std::shared_ptr<NoiseFilter> noise =
+  const auto noise =
       config.noise.radius > 0.0 ? std::make_shared<NoiseFilter>(config.noise) : nullptr;
-  const std::size_t max_points = config.ingest.max_points;
-  if (config.type == SourceType::kDepthImage) {
-    const std::string topic = config.camera_info.empty()
-                                  ? sibling_camera_info(nh->resolveName(config.topic))
-                                  : nh->resolveName(config.camera_info);
-    const auto camera = std::make_shared<DepthCamera>(config.name, topic);
-    const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> take =
-        [camera](const sensor_msgs::CameraInfoConstPtr& message) { camera->take(*message); };
-    subscription.camera_info = nh->subscribe<sensor_msgs::CameraInfo>(topic, 1, take);
-    subscription.messages = subscribe_as<sensor_msgs::Image>(
-        config, nh, begin, receive,
-        [camera, max_points, noise,
-         unit = config.depth_unit](const sensor_msgs::ImageConstPtr& message) {
-          return read_image(message, *camera, unit, max_points, noise);
+  if (config.type == SourceType::kCloud) {
+    return {subscribe_as<sensor_msgs::PointCloud2>(
+        config, nh, receive,
+        [max_points = config.ingest.max_points, noise](const auto& message) {
+          return read_cloud(message, max_points, noise);
         },
-        from_pool<sensor_msgs::Image>());
-    return subscription;
+        from_pool<sensor_msgs::PointCloud2>())};
   }
-  subscription.messages = subscribe_as<sensor_msgs::PointCloud2>(
-      config, nh, begin, receive,
-      [max_points, noise](const sensor_msgs::PointCloud2ConstPtr& message) {
-        return read_cloud(message, max_points, noise);
-      },
-      from_pool<sensor_msgs::PointCloud2>());
-  return subscription;
+  // By ROS' convention the CameraInfo is beside the images.
+  const std::string images = nh->resolveName(config.topic);
+  const std::string topic = config.camera_info.empty()
+                                ? images.substr(0, images.rfind('/') + 1) + "camera_info"
+                                : nh->resolveName(config.camera_info);
+  const auto camera = std::make_shared<DepthCamera>(config, topic, noise);
+  const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> take =
+      [camera](const sensor_msgs::CameraInfoConstPtr& message) { camera->take(*message); };
+  const ros::Subscriber camera_info = nh->subscribe<sensor_msgs::CameraInfo>(topic, 1, take);
+  return {subscribe_as<sensor_msgs::Image>(
+              config, nh, receive, [camera](const auto& message) { return camera->read(message); },
+              from_pool<sensor_msgs::Image>()),
+          camera_info};
 }
 
 }  // namespace ist

@@ -13,11 +13,11 @@ void MeasurementQueue::clear() {
 }
 
 std::size_t MeasurementQueue::add(MeasurementPtr measurement) {
-  const ros::Time& stamp = measurement->header().stamp;
-  bytes_ += measurement->bytes();
+  const ros::Time& stamp = measurement->header.stamp;
+  bytes_ += measurement->bytes;
   const auto after = std::upper_bound(waiting_.begin(), waiting_.end(), stamp,
                                       [](const ros::Time& time, const MeasurementPtr& other) {
-                                        return time < other->header().stamp;
+                                        return time < other->header.stamp;
                                       });
   waiting_.insert(after, std::move(measurement));
   std::size_t dropped = 0;
@@ -33,7 +33,7 @@ std::size_t MeasurementQueue::add(MeasurementPtr measurement) {
 std::size_t MeasurementQueue::most_crowded() const {
   if (waiting_.size() < 3) return 0;
   const auto gap = [&](std::size_t i) {
-    return seconds_between(waiting_[i - 1]->header().stamp, waiting_[i + 1]->header().stamp);
+    return seconds_between(waiting_[i - 1]->header.stamp, waiting_[i + 1]->header.stamp);
   };
   std::size_t best = 1;
   for (std::size_t i = 2; i + 1 < waiting_.size(); ++i) {
@@ -59,7 +59,7 @@ void MeasurementQueue::erase(std::size_t first, std::size_t last) {
   const auto at = [this](std::size_t i) {
     return waiting_.begin() + static_cast<std::ptrdiff_t>(i);
   };
-  for (std::size_t i = first; i < last; ++i) bytes_ -= waiting_[i]->bytes();
+  for (std::size_t i = first; i < last; ++i) bytes_ -= waiting_[i]->bytes;
   waiting_.erase(at(first), at(last));
 }
 

@@ -84,10 +84,7 @@ bool OtherRobot::owns(const std::string& frame) const {
 
 std::string OtherRobot::look_up_frame(const TransformBuffer& buffer, const std::string& fixed_frame,
                                       const std::string& frame, const ros::Time& time,
-                                      double max_age, Eigen::Isometry3d* X_FB, Lag* lag,
-                                      bool* is_own) const {
-  *is_own = owns(frame);
-  if (!*is_own) return "";
+                                      double max_age, Eigen::Isometry3d* X_FB, Lag* lag) const {
   const std::string link = frame.substr(std::char_traits<char>::length(kOwnFrame));
   std::string root;
   {

@@ -35,14 +35,13 @@ class OtherRobot {
   /// Whether a frame is known from its joint states alone, and so has no name in tf.
   bool owns(const std::string& frame) const;
 
-  /// Looks up where a frame of its links is.
+  /// Looks up where a frame that it owns is.
   /// @param buffer  with the poses of frames other than its own
   /// @param lag     see ist::look_up_near()
-  /// @param is_own  whether the frame is one of its own: else nothing is done
   /// @returns empty on success, else a sentence. Thread safe
   std::string look_up_frame(const TransformBuffer& buffer, const std::string& fixed_frame,
                             const std::string& frame, const ros::Time& time, double max_age,
-                            Eigen::Isometry3d* X_FB, Lag* lag, bool* is_own) const;
+                            Eigen::Isometry3d* X_FB, Lag* lag) const;
 
  private:
   const OtherRobotConfig config_;

@@ -30,24 +30,20 @@ bool stays_in_place(const InnerSphereTree& tree, const Eigen::Isometry3d& X_FL,
 // A cloud is worth more without one link's self-filter than after its timeout, so the wait ends
 // before that.
 Placer::Placer(const SourceConfig& config, const TransformBuffer& buffer)
-    : self_filter_(config.ingest.self_filter),
-      link_paddings_(config.link_paddings),
-      other_padding_(config.other_padding),
-      patience_(0.8 * std::min(config.timeout, 1.0)),
-      buffer_(buffer) {}
+    : config_(config), patience_(0.8 * std::min(config.timeout, 1.0)), buffer_(buffer) {}
 
 void Placer::begin_target() { target_since_ = std::chrono::steady_clock::now(); }
 
 std::string Placer::missing_transform(const Measurement& measurement,
                                       const SourceTarget& target) const {
-  const std::string sensor = without_slash(measurement.header().frame_id);
-  const std::vector<ros::Time> instants = measurement.instants();
+  const std::string sensor = without_slash(measurement.header.frame_id);
+  const std::vector<ros::Time>& instants = measurement.instants;
   std::string problem;
   for (const ros::Time& time : {instants.front(), instants.back()}) {
     if (is_known(buffer_, target.fixed_frame, sensor, time, &problem)) continue;
     return with_cause(buffer_, target.fixed_frame, sensor, problem);
   }
-  if (!self_filter_) return "";
+  if (!config_.ingest.self_filter) return "";
   for (const ros::Time& time : {instants.front(), instants.back()}) {
     for (std::size_t i = 0; i < target.model->links.size(); ++i) {
       const LinkModel& link = target.model->links[i];
@@ -74,11 +70,6 @@ bool Placer::is_worth_waiting_for(const std::string& link, const std::string& fi
          seconds_between(newest, now) < patience_;
 }
 
-double Placer::padding_of(const std::string& link) const {
-  const auto found = link_paddings_.find(link);
-  return found == link_paddings_.end() ? other_padding_ : found->second;
-}
-
 /// Adds the links whose poses are known at an instant, but for those that have not moved.
 void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, std::size_t instant,
                         FilterPoses* last, Placement* placement) const {
@@ -102,15 +93,18 @@ void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, std:
     last->X_FL[i] = X_FL;
     last->solid[i] = placement->robot.size();
     placement->robot.push_back(posed_solid(links[i], X_FL));
-    if (!link_paddings_.empty()) placement->paddings.push_back(padding_of(links[i].name));
+    if (const auto& paddings = config_.link_paddings; !paddings.empty()) {
+      const auto own = paddings.find(links[i].name);
+      placement->paddings.push_back(own == paddings.end() ? config_.other_padding : own->second);
+    }
     placement->robot_instants.emplace_back(instant, instant);
   }
 }
 
 std::string Placer::place(const Measurement& measurement, const SourceTarget& target,
                           Placement* placement) const {
-  const std::string sensor = without_slash(measurement.header().frame_id);
-  const std::vector<ros::Time> instants = measurement.instants();
+  const std::string sensor = without_slash(measurement.header.frame_id);
+  const std::vector<ros::Time>& instants = measurement.instants;
   if (instants.empty()) return "";
   std::string problem =
       look_up(buffer_, target.fixed_frame, sensor, instants.front(), &placement->X_FS);
@@ -118,7 +112,7 @@ std::string Placer::place(const Measurement& measurement, const SourceTarget& ta
   if (problem.empty() && instants.size() > 1) {
     problem = look_up(buffer_, target.fixed_frame, sensor, instants.back(), &placement->X_FS_end);
   }
-  if (!problem.empty() || !self_filter_) return problem;
+  if (!problem.empty() || !config_.ingest.self_filter) return problem;
   placement->known.assign(target.model->links.size(), true);
   const std::size_t count = target.model->links.size();
   FilterPoses last;

@@ -3,13 +3,11 @@
 #include <ros/time.h>
 
 #include <chrono>
-#include <map>
 #include <string>
 #include <vector>
 
 #include "ros/input/measurement.h"
-#include "ros/input/source_snapshot.h"
-#include "ros/input/source_state.h"
+#include "ros/input/source.h"
 #include "ros/poses/transform_buffer.h"
 
 namespace ist {
@@ -21,7 +19,7 @@ namespace ist {
 /// Not thread safe.
 class Placer {
  public:
-  /// @param buffer  outlives this
+  /// @param config, buffer  outlive this
   Placer(const SourceConfig& config, const TransformBuffer& buffer);
 
   /// Tells that the target's model or generation is new: all links get time to appear in tf.
@@ -49,11 +47,7 @@ class Placer {
   void pose_robot(const SourceTarget& target, const ros::Time& stamp, std::size_t instant,
                   FilterPoses* last, Placement* placement) const;
 
-  double padding_of(const std::string& link) const;
-
-  const bool self_filter_;
-  const std::map<std::string, double> link_paddings_;  ///< [m] see SourceConfig
-  const double other_padding_;                         ///< [m]
+  const SourceConfig& config_;
   const double patience_;  ///< [s] a cloud waits this long at most for one link's pose
   const TransformBuffer& buffer_;
   std::chrono::steady_clock::time_point target_since_;

@@ -23,63 +23,28 @@ ros::Time shifted(const ros::Time& stamp, double seconds) {
   return result;
 }
 
-class ScanMeasurement : public Measurement {
- public:
-  ScanMeasurement(const sensor_msgs::LaserScanConstPtr& message, const LaserScan& scan,
-                  const IngestConfig& ranges)
-      : Measurement(message->header, message->ranges.size() * sizeof(float)),
-        message_(message),
-        scan_(scan),
-        ranges_(ranges) {}
-
-  std::vector<ros::Time> instants() const override {
-    const double duration = scan_.duration();
-    const auto steps = static_cast<int>(std::ceil(std::abs(duration) / kBetweenPoses));
-    std::vector<ros::Time> times = {header().stamp};
-    for (int i = 1; i <= steps; ++i) {
-      times.push_back(shifted(header().stamp, duration * i / steps));
-    }
-    return times;
+// The robot's solids, each for the beams that were measured between the instants beside its own: a
+// beam is compared with two poses of a link, however many there are. A scan of ten seconds while
+// the robot turns has 400.
+std::vector<PosedSolid> robot_by_beam(const Placement& placement, std::size_t beams,
+                                      std::size_t instants) {
+  std::vector<PosedSolid> robot = placement.robot;
+  const std::size_t intervals = instants - 1, end = beams - 1;
+  if (intervals == 0) return robot;
+  const auto beam_at = [&](std::size_t instant) { return end * instant / intervals; };
+  for (std::size_t i = 0; i < robot.size(); ++i) {
+    const auto [first, last] = placement.robot_instants[i];
+    robot[i].first_point = static_cast<std::uint32_t>(first > 0 ? beam_at(first - 1) : 0);
+    robot[i].last_point =
+        static_cast<std::uint32_t>(last < intervals ? beam_at(last + 1) + 1 : end);
   }
-
-  void ingest(const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) const override {
-    ScanPoints points;
-    to_points(scan_, ranges_.min_range, ranges_.max_range,
-              placement.X_FS.inverse() * placement.X_FS_end, &points, ranges_.sensor_range);
-    ingest->run(points.raw(), placement.X_FS, robot_by_beam(placement), header().stamp.toSec(),
-                snapshot, placement.paddings);
-    const Eigen::Vector3d moved = placement.X_FS_end.translation() - placement.X_FS.translation();
-    if (!snapshot->extent.is_zero()) snapshot->extent.allow_for(moved.norm());
-  }
-
- private:
-  // The robot's solids, each for the beams that were measured between the instants beside its own:
-  // a beam is compared with two poses of a link, however many there are. A scan of ten seconds
-  // while the robot turns has 400.
-  std::vector<PosedSolid> robot_by_beam(const Placement& placement) const {
-    std::vector<PosedSolid> robot = placement.robot;
-    const std::size_t intervals = instants().size() - 1;
-    if (intervals == 0) return robot;
-    const std::size_t end = scan_.count - 1;
-    const auto beam_at = [&](std::size_t instant) { return end * instant / intervals; };
-    for (std::size_t i = 0; i < robot.size(); ++i) {
-      const auto [first, last] = placement.robot_instants[i];
-      robot[i].first_point = static_cast<std::uint32_t>(first > 0 ? beam_at(first - 1) : 0);
-      robot[i].last_point =
-          static_cast<std::uint32_t>(last < intervals ? beam_at(last + 1) + 1 : end);
-    }
-    return robot;
-  }
-
-  sensor_msgs::LaserScanConstPtr message_;
-  LaserScan scan_;  ///< views the message
-  IngestConfig ranges_;
-};
+  return robot;
+}
 
 }  // namespace
 
-Received read_scan(const sensor_msgs::LaserScanConstPtr& message, const IngestConfig& ranges,
-                   const ScanLimits& limits) {
+Measurement read_scan(const sensor_msgs::LaserScanConstPtr& message, const IngestConfig& ranges,
+                      const ScanLimits& limits) {
   LaserScan scan;
   scan.angle_min = static_cast<double>(message->angle_min);
   scan.angle_increment = static_cast<double>(message->angle_increment);
@@ -89,8 +54,27 @@ Received read_scan(const sensor_msgs::LaserScanConstPtr& message, const IngestCo
   scan.ranges = message->ranges.data();
   scan.count = message->ranges.size();
   const std::string fault = check_scan(scan, limits);
-  if (!fault.empty()) return {message->header, "malformed scan: " + fault, nullptr};
-  return {message->header, "", std::make_shared<ScanMeasurement>(message, scan, ranges)};
+  if (!fault.empty()) return faulty(message->header, "malformed scan: " + fault);
+  Measurement measurement;
+  measurement.header = message->header;
+  measurement.bytes = message->ranges.size() * sizeof(float);
+  const double duration = scan.duration();
+  const auto steps = static_cast<int>(std::ceil(std::abs(duration) / kBetweenPoses));
+  measurement.instants = {message->header.stamp};
+  for (int i = 1; i <= steps; ++i) {
+    measurement.instants.push_back(shifted(message->header.stamp, duration * i / steps));
+  }
+  measurement.take_in = [message, scan, ranges, instants = measurement.instants.size()](
+                            const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) {
+    ScanPoints points;
+    to_points(scan, ranges.min_range, ranges.max_range,
+              placement.X_FS.inverse() * placement.X_FS_end, &points, ranges.sensor_range);
+    ingest->run(points.raw(), placement.X_FS, robot_by_beam(placement, scan.count, instants),
+                message->header.stamp.toSec(), snapshot, placement.paddings);
+    const Eigen::Vector3d moved = placement.X_FS_end.translation() - placement.X_FS.translation();
+    if (!snapshot->extent.is_zero()) snapshot->extent.allow_for(moved.norm());
+  };
+  return measurement;
 }
 
 }  // namespace ist

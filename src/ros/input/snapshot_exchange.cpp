@@ -22,7 +22,6 @@ void empty(SourceSnapshot* snapshot) {
   snapshot->cloud.boxes.reset();
   snapshot->memory.reset();
   snapshot->model.reset();
-  snapshot->generation = 0;
 }
 
 }  // namespace

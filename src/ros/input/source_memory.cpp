@@ -13,7 +13,6 @@
 #include "internal/robot/anytime_model.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stopwatch.h"
-#include "ros/input/map_measurement.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
@@ -67,13 +66,14 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
   counts_from_ = cloud.counts_from;
   extent_ = extent_of_voxels(cloud.cloud.extent, map_.config().max_range);
   told_next_.problem = insert(measurement, placement, target, cloud);
+  std::shared_ptr<const SourceSnapshot> hidden;
   if (told_next_.problem.empty()) {
-    newest_ = make_snapshot(&MemoryMap::hidden_boxes);
+    hidden = make_snapshot(&MemoryMap::hidden_boxes);
   } else if (!std::isnan(map_.now())) {
     // Space that the last remembered cloud answered for may be out of this one's view.
     map_.forget(cloud.cloud.stamp);
     find_frame(cloud.stamp);
-    newest_ = make_snapshot(&MemoryMap::occupied_boxes);
+    hidden = make_snapshot(&MemoryMap::occupied_boxes);
   }
   if (map_.lost() > lost_) {
     lost_ = map_.lost();
@@ -84,11 +84,11 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
   const auto now = std::chrono::steady_clock::now();
   if (now >= next_count_) {
     next_count_ = now + kCountPeriod;
-    counts_ = map_.counts();
+    told_next_.counts = map_.counts();
   }
   took_ = watch.lap();
   hand_over();
-  return newest_;
+  return hidden;
 }
 
 void SourceMemory::begin_target(const SourceTarget& target) {
@@ -114,7 +114,6 @@ void SourceMemory::change_frame(const std::string& before) {
     note_loss("its memory is lost: it was in the frame '" + before + "', and is in '" + frame() +
               "' now");
   }
-  newest_.reset();
   map_.clear();
   body_.clear();
   body_noted_ = 0.0;
@@ -194,7 +193,6 @@ void SourceMemory::find_frame(const ros::Time& time) {
 void SourceMemory::hand_over() {
   next_growth_ = std::chrono::steady_clock::now() + kGrowthPeriod;
   told_next_.doubt = file_problem_.empty() ? shortage() : file_problem_;
-  told_next_.counts = counts_;
   if (!config_.required && !std::isnan(map_.now())) {
     told_next_.all = make_snapshot(&MemoryMap::occupied_boxes);
     channel_.back() = told_next_.all;
@@ -204,15 +202,12 @@ void SourceMemory::hand_over() {
   told_ = told_next_;
 }
 
-const SourceSnapshot* SourceMemory::newest(const std::shared_ptr<const RobotModel>& /*model*/,
-                                           const ros::Time& /*time*/, double /*max_age*/) {
+const SourceSnapshot* SourceMemory::newest(const SnapshotRequest& /*request*/) {
   channel_.update();
   return channel_.front().get();
 }
 
-std::shared_ptr<const SourceSnapshot> SourceMemory::share(
-    const std::shared_ptr<const RobotModel>& /*model*/, const ros::Time& /*time*/,
-    double /*max_age*/) {
+std::shared_ptr<const SourceSnapshot> SourceMemory::share(const SnapshotRequest& /*request*/) {
   const std::lock_guard<std::mutex> lock(told_mutex_);
   return told_.all;
 }
@@ -239,7 +234,7 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
   Eigen::Isometry3d X_MF = Eigen::Isometry3d::Identity();
   if (!frame.empty() && frame != target.fixed_frame) {
     const std::string fault =
-        look_up(buffer_, frame, target.fixed_frame, measurement.header().stamp, &X_MF);
+        look_up(buffer_, frame, target.fixed_frame, measurement.header.stamp, &X_MF);
     if (!fault.empty()) {
       return "the last " + std::string(noun(config_.type)) +
              " is not remembered (memory/frame_id): " + fault;
@@ -249,7 +244,7 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
   RegionOfInterest region_M = target.region;
   region_M.center_F = X_MF_ * target.region.center_F;
   map_.set_region(region_M);
-  read_memory_scan(*measurement.raw_cloud(), cloud.cloud, X_MF_ * cloud.cloud.X_FS,
+  read_memory_scan(measurement.points, cloud.cloud, X_MF_ * cloud.cloud.X_FS,
                    config_.ingest.min_range, map_.config().max_range, &scan_);
   map_.insert(scan_);
   told_next_.unplaced.clear();
@@ -282,7 +277,7 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::make_snapshot(
   snapshot->cloud.boxes = index;
   snapshot->cloud.X_FM = X_MF_.inverse();
   snapshot->cloud.box_extent = extent_;
-  snapshot->cloud.counts.received = static_cast<std::uint32_t>(counts_.known);
+  snapshot->cloud.counts.received = static_cast<std::uint32_t>(told_next_.counts.known);
   snapshot->cloud.counts.used = static_cast<std::uint32_t>(boxes.size());
   snapshot->cloud.stamp = cloud_stamp_.toSec();
   snapshot->cloud.ingest_time = took_;
@@ -308,8 +303,9 @@ std::string SourceMemory::frame() const {
 }
 
 std::string SourceMemory::shortage() const {
-  if (counts_.forgotten == 0 && counts_.skipped == 0) return "";
-  return "memory is short: " + std::to_string(counts_.forgotten) +
+  const MemoryCounts& counts = told_next_.counts;
+  if (counts.forgotten == 0 && counts.skipped == 0) return "";
+  return "memory is short: " + std::to_string(counts.forgotten) +
          " voxels were forgotten before their time" + advice();
 }
 

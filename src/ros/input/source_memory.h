@@ -10,9 +10,7 @@
 #include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/cloud/seen_space.h"
 #include "ros/input/measurement.h"
-#include "ros/input/obstacle_source.h"
-#include "ros/input/source_snapshot.h"
-#include "ros/input/source_state.h"
+#include "ros/input/source.h"
 #include "ros/parameters/source_config.h"
 #include "ros/poses/transform_buffer.h"
 
@@ -42,9 +40,6 @@ class SourceMemory : public ObstacleSource {
   /// Sets the source whose memory this is, before either is used; it outlives this.
   void set_parent(const ObstacleSource* parent) { parent_ = parent; }
   const ObstacleSource* parent() const override { return parent_; }
-  void set_model(std::shared_ptr<const RobotModel> /*model*/, const std::string& /*fixed_frame*/,
-                 const RegionOfInterest& /*region*/,
-                 const std::vector<bool>& /*filters*/) override {}
 
   // The source's thread only.
 
@@ -65,14 +60,12 @@ class SourceMemory : public ObstacleSource {
   /// All that is remembered, in view or not: what is known of obstacles while there is no fresh
   /// cloud. Null: nothing, or the source is required, so that nothing is known then. It stays valid
   /// until the next call and never waits. The cycle's thread only.
-  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model,
-                               const ros::Time& time, double max_age) override;
+  const SourceSnapshot* newest(const SnapshotRequest& request) override;
 
   // Thread safe. What is told waits for no cloud.
 
   /// The same for any other thread; valid as long as it is held.
-  std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model,
-                                              const ros::Time& time, double max_age) override;
+  std::shared_ptr<const SourceSnapshot> share(const SnapshotRequest& request) override;
   /// What it has lost of obstacles that it would still remember, as a sentence; empty: nothing.
   std::string loss() const;
 
@@ -121,7 +114,6 @@ class SourceMemory : public ObstacleSource {
 
   // Used by the source's thread alone.
   MemoryScan scan_;
-  std::shared_ptr<const SourceSnapshot> newest_;
   std::uint64_t generation_ = 0;
   double set_back_ = 0.0;  ///< [s] SourceTarget::set_back
   std::string fixed_frame_;
@@ -137,7 +129,6 @@ class SourceMemory : public ObstacleSource {
   Eigen::Isometry3d X_MF_ = Eigen::Isometry3d::Identity();
   VoxelBoxes links_;    ///< [m] each holds a link, in M
   double stamp_ = 0.0;  ///< [s] of the last cloud
-  MemoryCounts counts_;
   std::string file_problem_;
   bool is_file_read_ = false;  ///< or there was none
   Told told_next_;

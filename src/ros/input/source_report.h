@@ -74,4 +74,7 @@ struct SourceReport {
   std::vector<std::string> view_links;                 ///< names of view.links
 };
 
+/// A sentence when the points on the robot say that the sensor's pose in tf is wrong; else empty.
+std::string doubt_of_view(const ViewReport& view);
+
 }  // namespace ist

@@ -1,5 +1,6 @@
 #include "ros/input/topic_advice.h"
 
+#include <ros/master.h>
 #include <ros/this_node.h>
 #include <xmlrpcpp/XmlRpcValue.h>
 
@@ -33,8 +34,7 @@ std::string list(const std::vector<std::string>& names) {
   return text;
 }
 
-}  // namespace
-
+/// @param topics  all that are published
 std::string advice_on_topic(const std::string& topic, const std::string& type,
                             const std::string& own, const ros::master::V_TopicInfo& topics) {
   std::vector<std::string> same, others;
@@ -55,6 +55,8 @@ std::string advice_on_topic(const std::string& topic, const std::string& type,
   return same.empty() ? "no topic that a source could have is published"
                       : "published are " + list(same);
 }
+
+}  // namespace
 
 TopicAdvice::TopicAdvice(std::string topic, std::string type, std::string own)
     : topic_(std::move(topic)),

@@ -22,9 +22,9 @@ using Kind = WorldFaultKind;
 void WorldSource::receive(const ist_proximity::WorldObjects& message) {
   if (!running_) return;  // up to a thousand wait
   has_received_ = true;
-  state_.begin_work();
+  begin_work();
   guard(Kind::kMessage, [&] { apply(message); });
-  state_.end_work();
+  end_work();
   note_receipt(message.header.stamp);
 }
 
@@ -32,7 +32,7 @@ void WorldSource::receive(const ist_proximity::WorldObjects& message) {
 void WorldSource::note_receipt(const ros::Time& stamp) {
   const ros::Time now = ros::Time::now();
   stamp_ = stamp.isZero() ? now : std::min(stamp, now);
-  state_.update([&](SourceReport* report) {
+  update([&](SourceReport* report) {
     ++report->messages;
     report->newest = stamp_.toSec();
   });
@@ -48,8 +48,8 @@ void WorldSource::apply(const ist_proximity::WorldObjects& message) {
     return show_faults();
   }
   faults_.erase(fault_of(Kind::kMessage));
-  if (!message.replace_all) return change_all(message);
-  replace_from_topic([&] { change_all(message); });
+  if (!message.replace_all) return change_all(message.objects);
+  replace_from_topic([&] { change_all(message.objects); });
 }
 
 /// Removes the objects of the topic and adds others. Where these exceed a limit, all stays as it
@@ -79,21 +79,6 @@ void WorldSource::replace_from_topic(const std::function<void()>& change) {
   to_restate_ = std::move(to_restate);
   faults_ = std::move(faults);
   show_faults();
-}
-
-void WorldSource::change_all(const ist_proximity::WorldObjects& message) {
-  std::vector<WorldObject> added;
-  for (const ist_proximity::WorldObject& object : message.objects) {
-    const std::string name = printable(object.id);
-    try {
-      change(object, &added);
-    } catch (const ModelError& error) {
-      // An older description that the message holds must not end the fault of this one.
-      add(Kind::kMessage, std::exchange(added, {}));
-      note_fault(object_fault(object.id), "object '" + name + "': " + error.what());
-    }
-  }
-  add(Kind::kMessage, added);
 }
 
 /// Applies what a message says of one object; objects to add are collected, because many are built

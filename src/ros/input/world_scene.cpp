@@ -88,7 +88,7 @@ bool WorldSource::is_other_publisher(
 /// Applies a scene that has come by the topic or from the service.
 void WorldSource::use_scene(const std::function<PlanningScene()>& read) {
   has_received_ = true;
-  state_.begin_work();
+  begin_work();
   guard(Kind::kMessage, [&] { apply_scene(read()); });
   // A message that is not used may have changed anything: the scene is not known any more.
   const auto lost = faults_.find(fault_of(Kind::kMessage));
@@ -102,7 +102,7 @@ void WorldSource::use_scene(const std::function<PlanningScene()>& read) {
                "needed, or starts_empty");
   }
   show_faults();
-  state_.end_work();
+  end_work();
   note_receipt(ros::Time());
 }
 
@@ -110,12 +110,12 @@ void WorldSource::apply_scene(const PlanningScene& scene) {
   if (!scene.fault.empty()) return note_fault(fault_of(Kind::kMessage), scene.fault);
   if (scene.is_diff) {
     attach_all(scene);
-    change_all(scene);
+    change_all(scene.objects);
   } else {
     replace_from_topic([&] {
       remove_from_scene("");
       attach_all(scene);
-      change_all(scene);
+      change_all(scene.objects);
     });
   }
   show_doubts(scene.notes);
@@ -134,7 +134,7 @@ void WorldSource::show_doubts(std::vector<std::string> doubts) {
   if (!unmeasured.empty()) doubts.insert(doubts.begin(), unmeasured);
   const std::string doubt = join(doubts, "; ");
   if (!doubt.empty()) ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': " << doubt);
-  state_.update([&](SourceReport* report) { report->doubt = doubt; });
+  update([&](SourceReport* report) { report->doubt = doubt; });
 }
 
 /// Takes the octomap of a scene in place of the one before. One that cannot be used is told, and
@@ -219,22 +219,6 @@ void WorldSource::receive_answer() {
     ROS_INFO_STREAM("source '" << config_.name << "': the full planning scene has come from "
                                << scene_request_->service());
   }
-}
-
-void WorldSource::change_all(const PlanningScene& scene) {
-  std::vector<WorldObject> added;
-  for (const SceneObject& object : scene.objects) {
-    try {
-      change(object, &added);
-    } catch (const ModelError& error) {
-      // An older description that the message holds must not end the fault of this one.
-      add(Kind::kMessage, std::exchange(added, {}));
-      const bool is_clash = configured_.count(object.id) > 0;
-      note_fault({is_clash ? Kind::kClash : Kind::kObject, object.id},
-                 "object '" + printable(object.id) + "': " + error.what());
-    }
-  }
-  add(Kind::kMessage, added);
 }
 
 /// Applies what a scene says of one object; objects to add are collected, because many are built

@@ -7,10 +7,8 @@
 
 #include "ros/common/exceptions.h"
 #include "ros/common/publish.h"
-#include "ros/common/thread_name.h"
 #include "ros/input/world_conversion.h"
 #include "ros/input/world_markers.h"
-#include "ros/poses/transforms.h"
 
 namespace ist {
 namespace {
@@ -21,27 +19,18 @@ const ros::WallDuration kPoll(0.02);
 // Messages change the world, so none may be lost.
 constexpr std::uint32_t kQueueSize = 1000;
 
-std::string place_of(const SourceConfig& config, const ros::NodeHandle& nh) {
-  if (config.world.has_topic) return nh.resolveName(config.topic);
-  return config.file.empty() ? "~sources/" + config.name : config.file;
-}
-
 }  // namespace
 
 WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
                          const TransformBuffer& buffer)
-    : config_(config),
-      buffer_(buffer),
-      state_(config, place_of(config, nh)),
+    : Source(config, nh, buffer, ""),
       builder_(config.world.limits),
       has_full_scene_(config.world.starts_empty),
-      attached_(config.world.limits.max_objects),
-      topic_advice_(nh.resolveName(config.topic), message_type(config), "") {
+      attached_(config.world.limits.max_objects) {
   if (!config.world.robot.description.empty()) {
     robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, nh);
     is_robot_read_ = false;
-    state_.update(
-        [&](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
+    update([](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
   }
   markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("world/" + config.name, 1, true);
   if (config.world.is_planning_scene && !config.world.scene_service.empty()) {
@@ -49,19 +38,13 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
   }
   nh.setCallbackQueue(&queue_);
   if (config.world.has_topic) subscribe(&nh);
-  thread_ = std::thread(&WorldSource::run, this);
-}
-
-WorldSource::~WorldSource() {
-  running_ = false;
-  thread_.join();
-  subscriber_.shutdown();
+  start();
 }
 
 void WorldSource::subscribe(ros::NodeHandle* nh) {
   const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
   if (!config_.world.is_planning_scene) {
-    subscriber_ = nh->subscribe(config_.topic, kQueueSize, &WorldSource::receive, this, hints);
+    subscribers_ = {nh->subscribe(config_.topic, kQueueSize, &WorldSource::receive, this, hints)};
     return;
   }
   ros::SubscribeOptions options;
@@ -70,82 +53,26 @@ void WorldSource::subscribe(ros::NodeHandle* nh) {
       config_.topic, kQueueSize, [this](const Event& event) { receive_scene(event); });
   options.datatype = kPlanningSceneType;  // of any md5sum
   options.transport_hints = hints;
-  subscriber_ = nh->subscribe(options);
+  subscribers_ = {nh->subscribe(options)};
 }
 
-void WorldSource::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                            const RegionOfInterest& region, const std::vector<bool>& filters) {
-  state_.set_target(std::move(model), fixed_frame, region, filters);
-}
-
-const SourceSnapshot* WorldSource::newest(const std::shared_ptr<const RobotModel>& model,
-                                          const ros::Time& time, double max_age) {
-  const std::shared_ptr<SourceSnapshot>& snapshot = exchange_.newest();
-  if (!state_.is_current(snapshot.get(), model)) return nullptr;
-  if (original_ != snapshot) {
-    original_ = snapshot;
-    placed_ = *snapshot;
-  }
-  const std::string problem = place(time, max_age, &placed_);
-  state_.set_placing(problem, doubt_of_place(placed_));
-  return problem.empty() ? &placed_ : nullptr;
-}
-
-std::shared_ptr<const SourceSnapshot> WorldSource::share(
-    const std::shared_ptr<const RobotModel>& model, const ros::Time& time, double max_age) {
-  const std::shared_ptr<const SourceSnapshot> snapshot = exchange_.share();
-  if (!state_.is_current(snapshot.get(), model)) return nullptr;
-  const auto placed = std::make_shared<SourceSnapshot>(*snapshot);
-  return place(time, max_age, placed.get()).empty() ? placed : nullptr;
-}
-
-/// Looks up where the frames of the objects and of the octomap are.
-std::string WorldSource::place(const ros::Time& time, double max_age,
-                               SourceSnapshot* snapshot) const {
-  const std::string& fixed = snapshot->fixed_frame;
-  const std::vector<std::string>& frames = snapshot->world.world->frames();
-  snapshot->lags.resize(frames.size() + (snapshot->cloud.boxes ? 1 : 0));
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    std::string problem =
-        place_frame(fixed, frames[i], time, max_age, &snapshot->world.X_FB[i], &snapshot->lags[i]);
-    if (!problem.empty()) return problem;
-  }
-  if (!snapshot->cloud.boxes) return "";
-  Eigen::Isometry3d X_FB = Eigen::Isometry3d::Identity();
-  std::string problem =
-      place_frame(fixed, snapshot->map_frame, time, max_age, &X_FB, &snapshot->lags.back());
-  if (problem.empty()) snapshot->cloud.X_FM = X_FB * snapshot->X_BM;
-  return problem;
-}
-
-/// The first doubt about where the frames of a snapshot are; empty: none.
-std::string WorldSource::doubt_of_place(const SourceSnapshot& snapshot) const {
-  std::string doubt;
-  for (const std::string& frame : snapshot.world.world->frames()) {
-    if (frame == kFixedFrame || (robot_ && robot_->owns(frame))) continue;
-    if (doubt.empty()) doubt = doubt_of_pose(buffer_, snapshot.fixed_frame, frame);
-  }
-  return doubt;
-}
-
-/// Looks up where a frame is at an instant, or else at the newest one that tf knows.
-/// @param X_FB  the identity at first
+/// Places the links of the other robot, and what stands still in the fixed frame.
 std::string WorldSource::place_frame(const std::string& fixed_frame, const std::string& frame,
-                                     const ros::Time& time, double max_age, Eigen::Isometry3d* X_FB,
+                                     const SnapshotRequest& request, Eigen::Isometry3d* X_FB,
                                      Lag* lag) const {
   if (frame == kFixedFrame) return "";  // it is the identity for good
-  bool is_own = false;
-  std::string unplaced;
-  if (robot_) {
-    unplaced =
-        robot_->look_up_frame(buffer_, fixed_frame, frame, time, max_age, X_FB, lag, &is_own);
+  if (!robot_ || !robot_->owns(frame)) {
+    return Source::place_frame(fixed_frame, frame, request, X_FB, lag);
   }
-  if (!unplaced.empty() || is_own) return unplaced;
-  return look_up_near(buffer_, fixed_frame, frame, time, max_age, X_FB, lag);
+  return robot_->look_up_frame(buffer_, fixed_frame, frame, request.time, request.max_age, X_FB,
+                               lag);
+}
+
+bool WorldSource::is_in_tf(const std::string& frame) const {
+  return frame != kFixedFrame && !(robot_ && robot_->owns(frame));
 }
 
 void WorldSource::run() {
-  name_thread("ist " + config_.name);
   guard(Kind::kConfigured, [this] { read_configured(); });
   is_changed_ = true;
   while (running_) {
@@ -157,7 +84,8 @@ void WorldSource::run() {
     if (scene_request_) guard(Kind::kMessage, [this] { receive_answer(); });
     guard(Kind::kWork, [this] {
       if (!is_robot_read_) read_robot();
-      count_publishers();
+      const std::optional<std::uint32_t> publishers = count_publishers();
+      if (publishers && config_.world.is_planning_scene) note_publishers(*publishers);
       take_target();
       restate_waiting();
       if (is_changed_ && target_.model) publish();
@@ -199,31 +127,14 @@ void WorldSource::show_faults() {
       text += "; and " + std::to_string(faults_.size() - 1) + " more objects cannot be used";
     }
   }
-  state_.update([&](SourceReport* report) { report->incomplete = text; });
-}
-
-void WorldSource::count_publishers() {
-  if (!config_.world.has_topic) return;
-  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscriber_);
-  if (!publishers) return;
-  std::optional<std::string> advice;
-  if (!has_received_) advice = topic_advice_.ask();
-  if (config_.world.is_planning_scene) note_publishers(*publishers);
-  state_.update([&](SourceReport* report) {
-    report->publishers = *publishers;
-    if (advice) report->advice = *advice;
-  });
+  update([&](SourceReport* report) { report->incomplete = text; });
 }
 
 void WorldSource::take_target() {
-  SourceTarget newest = state_.target();
-  const bool is_same_robot =
-      newest.model == target_.model ||
-      (newest.model && target_.model && same_geometry(*newest.model, *target_.model));
-  if (!is_same_robot || newest.fixed_frame != target_.fixed_frame ||
-      newest.generation != target_.generation) {
-    is_changed_ = true;
-  }
+  SourceTarget newest = newest_target();
+  const bool is_same_robot = newest.is_same_robot(target_);
+  is_changed_ |= !is_same_robot || newest.fixed_frame != target_.fixed_frame ||
+                 newest.generation != target_.generation;
   if (!is_same_robot) {
     surfaces_ = newest.model ? make_robot_surfaces(newest.model, cancelled_) : nullptr;
   }

@@ -1,14 +1,11 @@
 #pragma once
 
 #include <ist_proximity/WorldObjects.h>
-#include <ros/callback_queue.h>
 #include <ros/message_event.h>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
-#include <ros/subscriber.h>
 #include <topic_tools/shape_shifter.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -17,21 +14,18 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
+#include "internal/geometry/limits.h"
 #include "internal/proximity/planning_scene.h"
+#include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/known_world.h"
-#include "ros/common/publisher_count.h"
-#include "ros/input/obstacle_source.h"
 #include "ros/input/other_robot.h"
 #include "ros/input/scene_request.h"
-#include "ros/input/snapshot_exchange.h"
-#include "ros/input/source_state.h"
-#include "ros/input/topic_advice.h"
+#include "ros/input/source.h"
 #include "ros/input/world_faults.h"
 #include "ros/parameters/source_config.h"
-#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -44,25 +38,18 @@ constexpr const char* kFixedFrame = "(fixed frame)";
 ///
 /// Objects are placed when a query asks for them, at the poses of their frames at that time. Where
 /// one of these is not known, or an object cannot be used, the source is not OK and says so.
-class WorldSource : public ObstacleSource {
+class WorldSource : public Source {
  public:
-  /// @param nh      in the namespace that the topic is relative to
+  /// @param nh      in the namespace that the topic is relative to; its callback queue is for the
+  ///                joint states of another robot
   /// @param buffer  outlives this
   /// @param private_nh  of ~world/NAME, the markers
   WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
               const TransformBuffer& buffer);
-  ~WorldSource() override;
-
-  void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                 const RegionOfInterest& region, const std::vector<bool>& filters) override;
-  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model,
-                               const ros::Time& time, double max_age) override;
-  std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model,
-                                              const ros::Time& time, double max_age) override;
-  void report(SourceReport* report) override { state_.report(report); }
+  ~WorldSource() override { stop(); }
 
  private:
-  void run();
+  void run() override;
   void guard(WorldFaultKind what, const std::function<void()>& function);
   void read_configured();
   void read_robot();
@@ -71,7 +58,8 @@ class WorldSource : public ObstacleSource {
   void replace_from_topic(const std::function<void()>& change);
   void receive(const ist_proximity::WorldObjects& message);
   void apply(const ist_proximity::WorldObjects& message);
-  void change_all(const ist_proximity::WorldObjects& message);
+  template <typename Objects>
+  void change_all(const Objects& objects);
   void change(const ist_proximity::WorldObject& message, std::vector<WorldObject>* added);
   void receive_scene(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
   bool is_other_publisher(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
@@ -82,7 +70,6 @@ class WorldSource : public ObstacleSource {
   void lose_scene();
   void ask_for_scene();
   void receive_answer();
-  void change_all(const PlanningScene& scene);
   void change(const SceneObject& object, std::vector<WorldObject>* added);
   void append(const SceneObject& object, std::vector<WorldObject>* added);
   void move(const SceneObject& object);
@@ -100,7 +87,6 @@ class WorldSource : public ObstacleSource {
   void restate_waiting();
   void remember_from_topic(const std::string& name);
   std::string frame_of(const std::string& stated) const;
-  void count_publishers();
   void add(WorldFaultKind what, const std::vector<WorldObject>& objects);
   void note_fault(const WorldFaultKey& key, const std::string& fault);
   void show_faults();
@@ -109,32 +95,20 @@ class WorldSource : public ObstacleSource {
   void publish();
   void free_unused();
   void publish_markers();
-  std::string place(const ros::Time& time, double max_age, SourceSnapshot* snapshot) const;
-  std::string doubt_of_place(const SourceSnapshot& snapshot) const;
   std::string place_frame(const std::string& fixed_frame, const std::string& frame,
-                          const ros::Time& time, double max_age, Eigen::Isometry3d* X_FB,
-                          Lag* lag) const;
+                          const SnapshotRequest& request, Eigen::Isometry3d* X_FB,
+                          Lag* lag) const override;
+  bool is_in_tf(const std::string& frame) const override;
 
-  const SourceConfig config_;
-  const TransformBuffer& buffer_;
-  ros::CallbackQueue queue_;
   ros::Publisher markers_;
-  ros::Subscriber subscriber_;         ///< unless there is no topic
   std::unique_ptr<OtherRobot> robot_;  ///< null: none
-  SnapshotExchange exchange_;
-  SourceState state_;
-
-  // Used by the thread that calls newest() alone.
-  std::shared_ptr<const SourceSnapshot> original_;  ///< of placed_
-  SourceSnapshot placed_;
 
   // Used by the source's thread alone.
   WorldBuilder builder_;
   WorldFaults faults_;
   WorldFaultLog fault_log_;
-  SourceTarget target_;
   std::shared_ptr<const RobotSurfaces> surfaces_;  ///< of target_.model
-  bool is_robot_read_ = true, is_changed_ = false, has_received_ = false;
+  bool is_robot_read_ = true, is_changed_ = false;
   std::chrono::steady_clock::time_point next_reading_;  ///< of the other robot's description
   std::set<std::string> from_topic_;                    ///< names of objects
   std::set<std::string> configured_;  ///< names of parameters, the file and the other robot
@@ -154,12 +128,26 @@ class WorldSource : public ObstacleSource {
   std::set<boost::shared_ptr<ros::M_string>> connections_;
   std::uint32_t publishers_ = 0;    ///< at the last count
   bool is_publisher_gone_ = false;  ///< whether scenes had a publisher, and now have none
-  PublisherCount publisher_count_;
-  TopicAdvice topic_advice_;
   ros::Time stamp_;
-  std::atomic<bool> running_{true};
   const std::function<bool()> cancelled_ = [this] { return !running_.load(); };
-  std::thread thread_;
 };
+
+/// @param objects  of a WorldObjects message or a scene
+template <typename Objects>
+void WorldSource::change_all(const Objects& objects) {
+  std::vector<WorldObject> added;
+  for (const auto& object : objects) {
+    try {
+      change(object, &added);
+    } catch (const ModelError& error) {
+      // An older description that the message holds must not end the fault of this one.
+      add(WorldFaultKind::kMessage, std::exchange(added, {}));
+      const bool is_clash = config_.world.is_planning_scene && configured_.count(object.id) > 0;
+      note_fault({is_clash ? WorldFaultKind::kClash : WorldFaultKind::kObject, object.id},
+                 "object '" + printable(object.id) + "': " + error.what());
+    }
+  }
+  add(WorldFaultKind::kMessage, added);
+}
 
 }  // namespace ist

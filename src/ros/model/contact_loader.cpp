@@ -13,12 +13,9 @@
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/common/exceptions.h"
 #include "ros/common/memory.h"
-#include "ros/common/thread_name.h"
 
 namespace ist {
 namespace {
-
-constexpr std::chrono::milliseconds kPoll(200);
 
 const LinkDescription* find_link(const RobotDescription& description, const std::string& name) {
   const auto found = std::find_if(description.links.begin(), description.links.end(),
@@ -35,17 +32,6 @@ std::shared_ptr<const ContactGeometry> no_body(const std::string& note) {
 
 }  // namespace
 
-ContactLoader::ContactLoader(const ServerConfig& config, const ModelLoader& loader)
-    : config_(config), loader_(loader) {
-  if (config_.contacts_wanted != ContactsWanted::kNone)
-    thread_ = std::thread(&ContactLoader::run, this);
-}
-
-ContactLoader::~ContactLoader() {
-  stop_signal_.stop();
-  if (thread_.joinable()) thread_.join();
-}
-
 std::shared_ptr<const ContactModel> ContactLoader::contacts() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return contacts_;
@@ -57,31 +43,29 @@ void ContactLoader::set(std::shared_ptr<const ContactModel> contacts) {
 }
 
 bool ContactLoader::is_current(const ModelState& state) const {
-  if (stop_signal_.stopped()) return false;
+  if (is_interrupted_()) return false;
   const auto newest = loader_.state();
   return newest->robot && same_geometry(*newest->robot, *state.robot);
 }
 
-void ContactLoader::run() {
-  name_thread("ist contact");
-  do {
-    bool is_new = false;
-    const std::string fault = exception_of([this, &is_new] {
-      while (follow()) is_new = true;
-    });
-    // No memory, for example; the next round tries again.
-    if (!fault.empty()) {
-      ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be computed: " << fault);
-    }
-    if (is_new) return_free_memory();  // packing needs some megabytes
-  } while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPoll));
+void ContactLoader::pack_when_due() {
+  if (config_.contacts_wanted == ContactsWanted::kNone) return;
+  bool is_new = false;
+  const std::string fault = exception_of([this, &is_new] {
+    while (follow()) is_new = true;
+  });
+  // No memory, for example; the next round tries again.
+  if (!fault.empty()) {
+    ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be computed: " << fault);
+  }
+  if (is_new) return_free_memory();  // packing needs some megabytes
 }
 
 /// Makes one body of the newest model, which may be another one than for the last body.
 /// @returns false where there is nothing to do
 bool ContactLoader::follow() {
   const auto state = loader_.state();
-  if (!state->robot || stop_signal_.stopped()) return false;
+  if (!state->robot || is_interrupted_()) return false;
   const auto contacts = this->contacts();
   if (!contacts || !same_geometry(*contacts->robot, *state->robot)) begin(*state);
   return add_next(*state);

@@ -13,7 +13,6 @@
 #include "ros/common/exceptions.h"
 #include "ros/common/memory.h"
 #include "ros/common/text.h"
-#include "ros/common/thread_name.h"
 
 namespace ist {
 namespace {
@@ -39,18 +38,20 @@ ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)
   ModelState waiting;
   waiting.problem = waiting_for_description();
   set_state(std::move(waiting));
-  thread_ = std::thread(&ModelLoader::run, this);
   refining_thread_ = std::thread(&ModelLoader::run_refinement, this);
 }
 
 ModelLoader::~ModelLoader() {
+  stop();
+  refining_thread_.join();
+}
+
+void ModelLoader::stop() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     stop_ = true;
   }
   wake_.notify_all();
-  thread_.join();
-  refining_thread_.join();
 }
 
 std::shared_ptr<const ModelState> ModelLoader::state() const {
@@ -82,31 +83,21 @@ std::string ModelLoader::reload(bool* found) {
     state_ = std::move(state);
     reload_ = true;
   }
-  wake_.notify_all();
   return *found ? "reading '" + nh_.resolveName(config_.robot_description) + "' again" : problem;
 }
 
-void ModelLoader::wait() {
-  std::unique_lock<std::mutex> lock(mutex_);
-  if (state_->phase == ModelState::Phase::kReady) {
-    wake_.wait(lock, [this] { return cancelled(); });
-  } else {
-    wake_.wait_for(lock, kPoll, [this] { return cancelled(); });
+void ModelLoader::load_when_due() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const bool is_due = reload_ || (state_->phase != ModelState::Phase::kReady &&
+                                    std::chrono::steady_clock::now() >= next_load_);
+    if (!is_due || stop_) return;
+    if (reload_) rejected_.clear();
+    reload_ = false;
   }
-}
-
-void ModelLoader::run() {
-  name_thread("ist model");
-  while (!stop_) {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (reload_) rejected_.clear();
-      reload_ = false;
-    }
-    const std::string fault = exception_of([this] { load_once(); });
-    if (!fault.empty()) fail(fault);
-    wait();
-  }
+  const std::string fault = exception_of([this] { load_once(); });
+  if (!fault.empty()) fail(fault);
+  next_load_ = std::chrono::steady_clock::now() + kPoll;
 }
 
 /// Says that an exception has ended the loading; the next round tries again.

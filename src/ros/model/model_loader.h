@@ -20,17 +20,22 @@
 
 namespace ist {
 
-/// Makes the robot's model in a thread of its own: it waits for robot_description on the parameter
-/// server, reads the URDF, and packs its links coarsely or takes them from the cache. After a text
-/// that is no URDF it reads again as soon as the parameter changes. Another thread, of low
+/// Makes the robot's model: it waits for robot_description on the parameter server, reads the URDF,
+/// and packs its links coarsely or takes them from the cache. After a text that is no URDF it reads
+/// again as soon as the parameter changes. A thread of its own, of low
 /// priority, measures the distance fields of all links, and packs finely those that need it. All
 /// members are thread safe.
 class ModelLoader {
  public:
   /// @param nh  namespace in which, and above which, `config.robot_description` is searched
   ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh);
-  /// Stops packing.
   ~ModelLoader();
+
+  /// Loads the model where that is due. It is called again and again by one thread, which it takes
+  /// as long as the model does.
+  void load_when_due();
+  /// Ends loading and packing, now and from now on.
+  void stop();
 
   std::shared_ptr<const ModelState> state() const;
 
@@ -57,7 +62,6 @@ class ModelLoader {
   void end_changes();
 
  private:
-  void run();
   void load_once();
   void fail(const std::string& fault);
   std::string waiting_for_description() const;
@@ -81,7 +85,6 @@ class ModelLoader {
   void finish(const RobotDescription& description, ModelState* state) const;
   RobotDescription carry_over_objects(ModelState* state);
   void set_state(ModelState state);
-  void wait();
   void run_refinement();
   bool refine_once();
   bool needs_final_packing(const ModelState& state, std::size_t link) const;
@@ -92,7 +95,8 @@ class ModelLoader {
 
   const ServerConfig config_;
   ros::NodeHandle nh_;
-  std::string rejected_;  ///< the last text that was no URDF; the thread's own
+  std::string rejected_;  ///< the last text that was no URDF; the loading thread's own
+  std::chrono::steady_clock::time_point next_load_;  ///< the same
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;
@@ -107,7 +111,7 @@ class ModelLoader {
 
   std::vector<std::shared_ptr<const ModelState>> retired_;  ///< the refining thread's own
 
-  std::thread thread_, refining_thread_;
+  std::thread refining_thread_;
 };
 
 }  // namespace ist

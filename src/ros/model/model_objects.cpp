@@ -135,7 +135,6 @@ std::optional<std::string> ModelLoader::detach_while_loading(const std::string& 
     objects_.erase(found);
     reload_ = true;
   }
-  wake_.notify_all();
   return "";
 }
 

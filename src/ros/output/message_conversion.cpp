@@ -15,11 +15,6 @@ using ist_proximity::ProximityArray;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-void assign_wrench(const Wrench& from, geometry_msgs::Wrench* wrench) {
-  assign(from.force, &wrench->force);
-  assign(from.torque, &wrench->torque);
-}
-
 void assign_closing(const ClosingRates& closing, LinkMessage* message) {
   message->closing_speed = closing.total;
   message->closing_speed_robot = closing.robot;
@@ -44,7 +39,9 @@ void assign_interval(const LinkProximity& result, LinkMessage* message) {
 }  // namespace
 
 LinkMessage unknown_link(const std::string& name) {
-  return to_message(name, LinkProximity(), RepulsiveWrench::unknown(), Wrench::unknown(), {}, "");
+  LinkMessage message;
+  assign_link(name, {}, RepulsiveWrench::unknown(), Wrench::unknown(), {}, "", &message);
+  return message;
 }
 
 void assign_link(const std::string& name, const LinkProximity& result,
@@ -61,15 +58,12 @@ void assign_link(const std::string& name, const LinkProximity& result,
   assign(result.direction, &message->direction);
   assign(repulsion.force, &message->repulsion);
   assign(repulsion.torque, &message->repulsion_torque);
-  assign_wrench(penetration, &message->penetration);
+  assign(penetration.force, &message->penetration.force);
+  assign(penetration.torque, &message->penetration.torque);
   assign_closing(closing, message);
   const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(kNaN);
   assign_unknown_space({}, kNaN, nowhere, false, message);
-  if (result.state >= LinkState::kNear) {
-    message->source = source;
-  } else {
-    message->source.clear();
-  }
+  message->source.assign(source, 0, result.state >= LinkState::kNear ? source.size() : 0);
 }
 
 void assign_unknown_space(const SeenShare& seen, double lower_bound,
@@ -83,14 +77,6 @@ void assign_unknown_space(const SeenShare& seen, double lower_bound,
   // What no sensor has seen is a part of the sensors' share; NaN stays NaN.
   message->interval_sensor += message->lower_bound - lower_bound;
   message->lower_bound = lower_bound;
-}
-
-LinkMessage to_message(const std::string& name, const LinkProximity& result,
-                       const RepulsiveWrench& repulsion, const Wrench& penetration,
-                       const ClosingRates& closing, const std::string& source) {
-  LinkMessage message;
-  assign_link(name, result, repulsion, penetration, closing, source, &message);
-  return message;
 }
 
 void assign_source(const SourceReport& source, const Status& status, const ros::Time& stamp,

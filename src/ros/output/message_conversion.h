@@ -29,9 +29,6 @@ void assign_link(const std::string& name, const LinkProximity& result,
                  const RepulsiveWrench& repulsion, const Wrench& penetration,
                  const ClosingRates& closing, const std::string& source,
                  ist_proximity::LinkProximity* message);
-ist_proximity::LinkProximity to_message(const std::string& name, const LinkProximity& result,
-                                        const RepulsiveWrench& repulsion, const Wrench& penetration,
-                                        const ClosingRates& closing, const std::string& source);
 
 /// Adds what is known of unknown space.
 /// @param lower_bound    [m] of the distance to it

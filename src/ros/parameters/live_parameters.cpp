@@ -12,7 +12,6 @@
 
 #include "ros/common/publish.h"
 #include "ros/common/text.h"
-#include "ros/common/thread_name.h"
 
 namespace ist {
 namespace {
@@ -137,17 +136,8 @@ LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerCo
     for (const char* name : kGroups) advertise(name, defaults);
   }
   read_again();
-  thread_ = std::thread(&LiveParameters::run, this);
-}
-
-LiveParameters::~LiveParameters() {
-  stop_signal_.stop();
-  thread_.join();
-}
-
-void LiveParameters::run() {
-  name_thread("ist parameters");
-  while (stop_signal_.sleep_until(Clock::now() + std::chrono::seconds(1))) read_again();
+  timer_ = private_nh_.createSteadyTimer(ros::WallDuration(1.0),
+                                         [this](const ros::SteadyTimerEvent&) { read_again(); });
 }
 
 void LiveParameters::advertise(const std::string& name, const LiveConfig& defaults) {

@@ -11,19 +11,17 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
-#include "ros/common/stop_signal.h"
 #include "ros/parameters/parameters.h"
 
 namespace ist {
 
 /// Parameters that may change while the node runs: ~query/*, ~repulsion/*,
 /// ~penetration/stiffness and ~speed_scale/*. They change on the parameter server, which is read
-/// again once a second in a thread of its own, or through dynamic_reconfigure, in one group for
-/// each of these names and for ~speed_scale/separation (rqt_reconfigure; `rosrun
-/// dynamic_reconfigure dynparam set ~query ...`). Distances of single links have no group.
+/// again once a second, or through dynamic_reconfigure, in one group for each of these names and
+/// for ~speed_scale/separation (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query
+/// ...`). Distances of single links have no group.
 ///
 /// Every value stays in use until a valid one replaces it, whatever happens to the parameter
 /// server: no answer, a master that restarts, names that are deleted, values that are wrong.
@@ -40,7 +38,6 @@ class LiveParameters {
  public:
   /// @param config  as read at the start
   LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config);
-  ~LiveParameters();
 
   LiveConfig get() const;
 
@@ -89,8 +86,7 @@ class LiveParameters {
   std::string without_effect_;
   Clock::time_point asked_;  ///< when the server was asked that has not answered yet; else 0
 
-  StopSignal stop_signal_;
-  std::thread thread_;
+  ros::SteadyTimer timer_;
 };
 
 }  // namespace ist

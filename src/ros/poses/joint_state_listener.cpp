@@ -33,19 +33,12 @@ JointStateListener::JointStateListener(TransformBuffer* buffer, ros::NodeHandle 
                                        std::function<void()> on_state)
     : buffer_(*buffer), on_state_(std::move(on_state)) {
   report_.topic = nh.resolveName("joint_states");
-  nh.setCallbackQueue(thread_.queue());
   using Event = ros::MessageEvent<const sensor_msgs::JointState>;
   const boost::function<void(const Event&)> callback = [this](const Event& event) {
     receive(event);
   };
   subscriber_ = nh.subscribe<sensor_msgs::JointState, const Event&>(
       "joint_states", 100, callback, {}, ros::TransportHints().tcpNoDelay());
-  thread_.start("ist joints", [this] { count_publishers(); });
-}
-
-JointStateListener::~JointStateListener() {
-  thread_.stop();
-  subscriber_.shutdown();
 }
 
 void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinematics) {
@@ -103,8 +96,10 @@ bool JointStateListener::is_waiting() {
 }
 
 JointStateReport JointStateListener::report() {
+  const std::uint32_t publishers = subscriber_.getNumPublishers();  // it can wait for the master
   const std::lock_guard<std::mutex> lock(mutex_);
   JointStateReport report = report_;
+  report.publishers = publishers;
   if (std::chrono::steady_clock::now() - problem_time_ > kProblemAge) report.problem.clear();
   return report;
 }
@@ -123,14 +118,6 @@ void JointStateListener::forget() {
   tracks_.assign(joints, PublisherTrack());
   stated_.clear();
   place_.assign(joints, kNowhere);
-}
-
-/// Counts outside report(), because roscpp's answer can wait for the master.
-void JointStateListener::count_publishers() {
-  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscriber_);
-  if (!publishers) return;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  report_.publishers = *publishers;
 }
 
 void JointStateListener::drop(const std::string& problem, std::size_t count) {

@@ -14,8 +14,6 @@
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
-#include "ros/common/callback_thread.h"
-#include "ros/common/publisher_count.h"
 #include "ros/poses/joint_position_queue.h"
 #include "ros/poses/publisher_track.h"
 #include "ros/poses/transform_buffer.h"
@@ -33,7 +31,8 @@ struct JointStateReport {
   std::string problem;           ///< the last one of the last second; empty when there was none
 };
 
-/// Receives joint_states in a thread of its own and keeps each joint's newest position.
+/// Receives joint_states in the thread of the node handle's callback queue and keeps each joint's
+/// newest position.
 ///
 /// Messages may hold some of the joints only, from any number of publishers. A faulty message or
 /// position (sizes that differ, NaN, a joint that the URDF lacks or that is stated twice, a stamp
@@ -59,7 +58,6 @@ class JointStateListener {
   /// @param nh       in the namespace that `joint_states` is relative to
   /// @param on_state called from the listener's thread after each message with a new position
   JointStateListener(TransformBuffer* buffer, ros::NodeHandle nh, std::function<void()> on_state);
-  ~JointStateListener();
   JointStateListener(const JointStateListener&) = delete;
   JointStateListener& operator=(const JointStateListener&) = delete;
 
@@ -101,12 +99,10 @@ class JointStateListener {
   void notice_clock_jump();
   void forget();
   void copy(const JointPositions& from, const Kinematics& kinematics, JointPositions* positions);
-  void count_publishers();
   void drop(const std::string& problem, std::size_t count);
 
   TransformBuffer& buffer_;
   const std::function<void()> on_state_;
-  CallbackThread thread_;
   ros::Subscriber subscriber_;
 
   std::mutex mutex_;  // guards the members below; held for copies and one message only
@@ -120,8 +116,6 @@ class JointStateListener {
   JointStateReport report_;
   std::chrono::steady_clock::time_point problem_time_;
   ros::Time last_now_;
-
-  PublisherCount publisher_count_;  // used by the listener's thread alone
 };
 
 /// The frames whose poses come from joint states, so that tf's are not needed: the child links of

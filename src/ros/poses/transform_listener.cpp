@@ -10,7 +10,6 @@
 namespace ist {
 TransformListener::TransformListener(TransformBuffer* buffer, ros::NodeHandle nh)
     : buffer_(*buffer) {
-  nh.setCallbackQueue(thread_.queue());
   const auto hints = ros::TransportHints().tcpNoDelay();
   using Event = ros::MessageEvent<const tf2_msgs::TFMessage>;
   using Callback = boost::function<void(const Event&)>;
@@ -19,13 +18,6 @@ TransformListener::TransformListener(TransformBuffer* buffer, ros::NodeHandle nh
   moving_ = nh.subscribe<tf2_msgs::TFMessage, const Event&>("/tf", 100, receive_moving, {}, hints);
   static_ =
       nh.subscribe<tf2_msgs::TFMessage, const Event&>("/tf_static", 100, receive_static, {}, hints);
-  thread_.start("ist tf", [this] { buffer_.end_disputes(ros::Time::now()); });
-}
-
-TransformListener::~TransformListener() {
-  thread_.stop();
-  moving_.shutdown();
-  static_.shutdown();
 }
 
 void TransformListener::notice_clock_jump() {

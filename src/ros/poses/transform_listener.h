@@ -9,12 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "ros/common/callback_thread.h"
 #include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
-/// Fills a tf buffer from /tf and /tf_static, in a thread of its own.
+/// Fills a tf buffer from /tf and /tf_static, in the thread of the node handle's callback queue.
 ///
 /// It differs from tf2_ros::TransformListener in that it rejects transforms that tf2 would refuse,
 /// with a reason (see TransformBuffer), and those that are stamped far ahead of the clock. When the
@@ -25,7 +24,6 @@ class TransformListener {
  public:
   /// @param buffer  outlives this
   TransformListener(TransformBuffer* buffer, ros::NodeHandle nh);
-  ~TransformListener();
 
   /// Empties the buffer if the ROS clock has jumped back since the last call or message; static
   /// transforms stay. Thread safe.
@@ -44,7 +42,6 @@ class TransformListener {
   bool is_ignored(const std::string& child_frame) const;
 
   TransformBuffer& buffer_;
-  CallbackThread thread_;
   ros::Subscriber moving_, static_;
 
   mutable std::mutex mutex_;

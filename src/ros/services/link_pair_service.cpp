@@ -16,6 +16,14 @@ namespace {
 
 using PairMessage = ist_proximity::LinkPair;
 
+// What was found of a pair; null: it was not sampled.
+const SampledPair* find(const std::vector<SampledPair>& sampled, const LinkPair& pair) {
+  const auto found = std::find_if(sampled.begin(), sampled.end(), [&](const SampledPair& one) {
+    return one.pair.first == pair.first && one.pair.second == pair.second;
+  });
+  return found == sampled.end() ? nullptr : &*found;
+}
+
 std::uint8_t word_of(const SampledPair& pair) {
   if (pair.measured == 0) return PairMessage::NOT_KNOWN;
   if (pair.never()) return PairMessage::NEVER;
@@ -36,17 +44,13 @@ std::string text_of(const std::vector<SampledPair>& sampled, std::size_t configu
 
 LinkPairService::LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config)
     : config_(config) {
-  private_nh.setCallbackQueue(callbacks_.queue());
   service_ = private_nh.advertiseService("link_pairs", &LinkPairService::answer, this);
-  callbacks_.start("ist link pairs");
   thread_ = std::thread(&LinkPairService::run, this);
 }
 
 LinkPairService::~LinkPairService() {
   stop_signal_.stop();
   thread_.join();
-  callbacks_.stop();
-  service_.shutdown();
 }
 
 void LinkPairService::set_model(std::shared_ptr<const ModelState> model) {
@@ -146,16 +150,13 @@ std::string LinkPairService::left_out_though_apart(const Findings& findings) {
   const RobotModel& robot = *findings.model->robot;
   std::vector<std::string> names;
   for (const ChosenPair& chosen : findings.chosen) {
-    if (chosen.reason != PairReason::kAtRest) continue;
-    for (const SampledPair& sampled : findings.sampled) {
-      const bool is_same =
-          sampled.pair.first == chosen.pair.first && sampled.pair.second == chosen.pair.second;
-      if (!is_same || sampled.contacts == sampled.measured) continue;
-      names.push_back(robot.links[chosen.pair.first].name + " and " +
-                      robot.links[chosen.pair.second].name + " (apart in " +
-                      std::to_string(sampled.measured - sampled.contacts) + " of " +
-                      std::to_string(sampled.measured) + ")");
-    }
+    const SampledPair* sampled = find(findings.sampled, chosen.pair);
+    if (chosen.reason != PairReason::kAtRest || !sampled) continue;
+    if (sampled->contacts == sampled->measured) continue;
+    names.push_back(robot.links[chosen.pair.first].name + " and " +
+                    robot.links[chosen.pair.second].name + " (apart in " +
+                    std::to_string(sampled->measured - sampled->contacts) + " of " +
+                    std::to_string(sampled->measured) + ")");
   }
   return join(names, ", ");
 }
@@ -182,13 +183,10 @@ bool LinkPairService::answer(Service::Request& request, Service::Response& respo
     pair.first = robot.links[chosen.pair.first].name;
     pair.second = robot.links[chosen.pair.second].name;
     pair.reason = static_cast<std::uint8_t>(chosen.reason);
-    for (const SampledPair& sampled : findings->sampled) {
-      if (sampled.pair.first != chosen.pair.first || sampled.pair.second != chosen.pair.second) {
-        continue;
-      }
-      pair.sampled = word_of(sampled);
-      pair.contacts = static_cast<std::uint32_t>(sampled.contacts);
-      pair.measured = static_cast<std::uint32_t>(sampled.measured);
+    if (const SampledPair* sampled = find(findings->sampled, chosen.pair)) {
+      pair.sampled = word_of(*sampled);
+      pair.contacts = static_cast<std::uint32_t>(sampled->contacts);
+      pair.measured = static_cast<std::uint32_t>(sampled->measured);
     }
     response.pairs.push_back(pair);
   }

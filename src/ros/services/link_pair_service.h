@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "ist_proximity/proximity/self_query.h"
-#include "ros/common/callback_thread.h"
 #include "ros/common/stop_signal.h"
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
@@ -48,13 +47,12 @@ class LinkPairService {
   bool answer(Service::Request& request, Service::Response& response);
 
   const ServerConfig config_;
-  CallbackThread callbacks_;
-  ros::ServiceServer service_;
   StopSignal stop_signal_;    ///< a new model is its event
   mutable std::mutex mutex_;  ///< guards the next three members
   std::shared_ptr<const ModelState> newest_model_;
   bool is_new_ = false;
   std::shared_ptr<const Findings> findings_;  ///< null before the first model
+  ros::ServiceServer service_;
   std::thread thread_;
 };
 

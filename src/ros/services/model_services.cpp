@@ -6,30 +6,16 @@
 
 namespace ist {
 
-ModelServices::ModelServices(ros::NodeHandle private_nh, ModelLoader* loader) : loader_(*loader) {
-  private_nh.setCallbackQueue(thread_.queue());
-  reload_service_ = private_nh.advertiseService("reload_model", &ModelServices::reload, this);
-  detach_service_ = private_nh.advertiseService("detach_object", &ModelServices::detach, this);
-  private_nh.setCallbackQueue(attach_thread_.queue());
-  attach_service_ = private_nh.advertiseService("attach_object", &ModelServices::attach, this);
-  thread_.start("ist services");
-  attach_thread_.start("ist attach");
-}
-
-ModelServices::~ModelServices() {
-  loader_.end_changes();
-  attach_thread_.stop();
-  thread_.stop();
-  attach_service_.shutdown();
-  reload_service_.shutdown();
-  detach_service_.shutdown();
-  save_service_.shutdown();
-}
-
-void ModelServices::offer(ros::NodeHandle private_nh, const SourceMemories& memories) {
-  memories_ = memories;
-  private_nh.setCallbackQueue(thread_.queue());
-  save_service_ = private_nh.advertiseService("save_memory", &ModelServices::save, this);
+ModelServices::ModelServices(ros::NodeHandle private_nh, ros::CallbackQueue* attaching,
+                             ModelLoader* loader, const SourceMemories& memories)
+    : loader_(*loader), memories_(memories) {
+  services_ = {private_nh.advertiseService("reload_model", &ModelServices::reload, this),
+               private_nh.advertiseService("detach_object", &ModelServices::detach, this)};
+  if (!memories.empty()) {
+    services_.push_back(private_nh.advertiseService("save_memory", &ModelServices::save, this));
+  }
+  private_nh.setCallbackQueue(attaching);
+  services_.push_back(private_nh.advertiseService("attach_object", &ModelServices::attach, this));
 }
 
 bool ModelServices::save(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {

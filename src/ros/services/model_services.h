@@ -2,28 +2,30 @@
 
 #include <ist_proximity/AttachObject.h>
 #include <ist_proximity/DetachObject.h>
+#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <ros/service_server.h>
 #include <std_srvs/Trigger.h>
 
-#include "ros/common/callback_thread.h"
+#include <vector>
+
 #include "ros/input/source_memory.h"
 #include "ros/model/model_loader.h"
 
 namespace ist {
 
 /// Answers the services that change the robot's model: ~reload_model, ~attach_object and
-/// ~detach_object, and ~save_memory, in threads of their own. Attaching has a thread for itself,
-/// because it takes long and because detaching or reloading cancels it.
+/// ~detach_object, and ~save_memory. Attaching has another thread, because it takes long and
+/// because detaching or reloading cancels it.
 class ModelServices {
  public:
-  /// @param loader  outlives this
-  ModelServices(ros::NodeHandle private_nh, ModelLoader* loader);
+  /// @param attaching  the queue of ~attach_object
+  /// @param loader     outlives this
+  /// @param memories   empty: there is no ~save_memory
+  ModelServices(ros::NodeHandle private_nh, ros::CallbackQueue* attaching, ModelLoader* loader,
+                const SourceMemories& memories);
   /// Cancels what is under way.
-  ~ModelServices();
-
-  /// Advertises ~save_memory, which writes the memories that have a memory/file.
-  void offer(ros::NodeHandle private_nh, const SourceMemories& memories);
+  ~ModelServices() { loader_.end_changes(); }
 
  private:
   bool reload(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
@@ -34,9 +36,8 @@ class ModelServices {
   bool save(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
 
   ModelLoader& loader_;
-  CallbackThread thread_, attach_thread_;
-  ros::ServiceServer reload_service_, attach_service_, detach_service_, save_service_;
-  SourceMemories memories_;
+  const SourceMemories memories_;
+  std::vector<ros::ServiceServer> services_;
 };
 
 }  // namespace ist

@@ -41,16 +41,21 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 
 QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
                            const CloudSources& sources, const TransformBuffer& buffer,
-                           std::function<LiveConfig()> live, UnknownSpaceWatch* watch)
+                           std::function<LiveConfig()> live, UnknownSpaceWatch* watch,
+                           std::function<void()> meanwhile)
     : config_(config),
       sources_(sources),
       buffer_(buffer),
       live_(std::move(live)),
       watch_(watch),
+      meanwhile_(std::move(meanwhile)),
       self_(config) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
-  thread_.start("ist query", [this] { return_memory(); });
+  thread_.start("ist query", [this] {
+    return_memory();
+    meanwhile_();
+  });
 }
 
 QueryService::~QueryService() {
@@ -95,11 +100,9 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
     return_memory_until_ = std::chrono::steady_clock::now() + kReturnMemoryFor;
   }
   if (!response.success) {
-    response.results.clear();
-    response.impact_links.clear();
-    response.impact_times.clear();
-    response.pairs.clear();
-    response.pair_impact_times.clear();
+    const std::string message = response.message;
+    response = Service::Response();
+    response.message = message;
     return true;
   }
   const auto bad =
@@ -185,6 +188,7 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }
+    meanwhile_();
     if (!thread_.is_running()) return "the node ends";
   }
   if (request.times.empty()) return "";
@@ -254,6 +258,7 @@ std::string QueryService::find_impact_times(const Service::Request& request,
                   cycle_->worlds(), &impacts);
     if (request.self_proximity != 0) self_.advance(motion, request.times[k], still, query);
     note_impacts(impacts, request.times[k], &first, &wanted);
+    meanwhile_();
     if (!thread_.is_running()) return "the node ends";
   }
   for (std::size_t i = 0; i < chosen_.size(); ++i) {

@@ -14,7 +14,6 @@
 #include "ist_proximity/proximity/time_of_impact.h"
 #include "ros/common/callback_thread.h"
 #include "ros/cycle/proximity_cycle.h"
-#include "ros/input/cloud_source.h"
 #include "ros/input/unknown_space.h"
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
@@ -31,9 +30,11 @@ class QueryService {
   /// @param sources, buffer  outlive this
   /// @param watch            outlives this; null with ~unknown_space free
   /// @param live             gives the present configuration; called from the service's thread
+  /// @param meanwhile        what else that thread does: called 20 times a second or more often,
+  ///                         also during a long request; throws nothing
   QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const CloudSources& sources,
                const TransformBuffer& buffer, std::function<LiveConfig()> live,
-               UnknownSpaceWatch* watch = nullptr);
+               UnknownSpaceWatch* watch, std::function<void()> meanwhile);
   ~QueryService();
 
   /// Thread safe.
@@ -57,6 +58,7 @@ class QueryService {
   const TransformBuffer& buffer_;
   const std::function<LiveConfig()> live_;
   UnknownSpaceWatch* const watch_;  ///< null with ~unknown_space free
+  const std::function<void()> meanwhile_;
   CallbackThread thread_;
   ros::ServiceServer service_;
 

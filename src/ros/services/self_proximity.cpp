@@ -250,15 +250,15 @@ void SelfProximity::add_link(std::size_t link, const RepulsionConfig& repulsion,
   std::size_t other = link;
   const LinkProximity answer = nearest(link, &other);
   const RobotModel& robot = *model_->robot;
-  const std::string& other_name = robot.links[other].name;
   const RepulsiveWrench push =
       poses_.known[link]
           ? self_repulsion(link, poses_.X_FL[link], query_->pairs(), results_, repulsion)
           : RepulsiveWrench::unknown();
   // Both links move, so the speed has no parts.
   const ClosingRates closing = speeds_[link].update_pair(poses_.stamp.toSec(), answer);
-  message->links.push_back(to_message(robot.links[link].name, answer, push,
-                                      penetration(link, answer), closing, other_name));
+  message->links.emplace_back();
+  assign_link(robot.links[link].name, answer, push, penetration(link, answer), closing,
+              robot.links[other].name, &message->links.back());
 }
 
 }  // namespace ist

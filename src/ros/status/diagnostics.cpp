@@ -5,7 +5,6 @@
 
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
-#include "ros/input/source_state.h"
 
 namespace ist {
 namespace {

@@ -1,0 +1,339 @@
+#include "ros/input/sensor_source.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "ros/common/exceptions.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/publish.h"
+#include "ros/common/ros_time.h"
+#include "ros/common/text.h"
+
+namespace ist {
+namespace {
+
+// Clouds of one stream may overtake each other; stamps that go back farther are a new start. [s]
+constexpr double kMaxDisorder = 1.0;
+// Characters of a frame's name, which every status that mentions it repeats.
+constexpr std::size_t kMaxFrameName = 256;
+const ros::WallDuration kPollIdle(0.05), kPollTaken(0.005), kPollTf(0.0005);
+
+/// Stamps that are farther ahead of the clock are not believed. [s]
+double future_tolerance(double timeout) { return std::min(timeout, kMaxAhead); }
+
+/// The end of a sentence about a measurement that waits for tf: its clock may be the reason.
+std::string clock_difference(const Measurement& measurement) {
+  const double ahead = seconds_between(measurement.counts_from(), measurement.header.stamp);
+  if (ahead < kToldSkew) return "";
+  return format_text("; its stamp is %.3f s ahead of the clock", ahead);
+}
+
+}  // namespace
+
+SensorSource::SensorSource(const SourceConfig& config, ros::NodeHandle nh,
+                           const TransformBuffer& buffer, const ros::Publisher& filtered,
+                           std::shared_ptr<SourceMemory> memory, WarmUp warm_up)
+    : Source(config, nh, buffer, filtered.getTopic()),
+      is_map_(config.type == SourceType::kMap),
+      noun_(noun(config.type)),
+      filtered_(filtered),
+      memory_(std::move(memory)),
+      warm_up_(std::move(warm_up)),
+      placer_(config_, buffer),
+      ingest_(ingest_config(config)) {
+  nh.setCallbackQueue(&queue_);
+  if (config.file.empty()) {
+    subscribers_ = subscribe(config, &nh, [this](const std::function<Measurement()>& read) {
+      guard([&] {
+        if (is_map_) begin_work();  // others are read in no time
+        Measurement measurement = read();
+        if (is_map_) end_work();
+        receive(std::move(measurement));
+      });
+    });
+  }
+  start();
+}
+
+void SensorSource::run() {
+  if (!config_.file.empty()) {
+    guard([this] {
+      last_map_ = std::make_shared<Measurement>(
+          read_map_file(config_.file, without_slash(config_.frame_id), config_.map));
+      map_is_new_ = last_map_->fault.empty();
+      set_problem(last_map_->fault, false);
+      if (!map_is_new_) last_map_.reset();
+    });
+  }
+  while (running_) {
+    // Before the next message is read, so that the new one can use the memory of an old one.
+    const bool is_taken = exchange_.release_unused();
+    const ros::WallDuration idle = is_taken ? kPollIdle : kPollTaken;
+    guard([&] { queue_.callAvailable(waiting_.empty() ? idle : kPollTf); });
+    guard([this] {
+      take_target();
+      drop_overdue();
+      place_newest();
+      use_map();
+      if (memory_) memory_->grow_older();
+      count_publishers();
+    });
+  }
+}
+
+/// Calls a function. An exception drops what waits, so that it is not met again and again: the
+/// source goes stale unless other messages can be used.
+void SensorSource::guard(const std::function<void()>& function) {
+  const std::string fault = exception_of(function);
+  if (fault.empty()) return;
+  waiting_.clear();
+  waits_for_tf_ = false;
+  end_work();
+  const std::string problem = "its " + noun_ + " could not be used: " + fault;
+  set_problem(problem, true);
+  ROS_ERROR_STREAM_THROTTLE(5.0, "source '" << config_.name << "': " << problem);
+}
+
+/// Takes the newest target, and drops measurements of another model or from before the clock's
+/// jump.
+void SensorSource::take_target() {
+  SourceTarget newest = newest_target();
+  const bool is_same_time = newest.generation == target_.generation;
+  if (!is_same_time && !config_.is_permanent()) last_map_.reset();
+  if (!is_same_time || !newest.model) waiting_.clear();
+  if (!is_same_time || !newest.is_same_robot(target_)) {
+    in_use_ = ros::Time();
+    map_is_new_ = last_map_ != nullptr;
+    placer_.begin_target();
+  }
+  target_ = std::move(newest);
+  if (memory_ && target_.model) memory_->begin_target(target_);
+}
+
+void SensorSource::receive(Measurement measurement) {
+  has_received_ = true;
+  take_target();
+  const ros::Time stamp = measurement.header.stamp;
+  const std::string problem = check(measurement);
+  const double ahead = seconds_between(ros::Time::now(), stamp);
+  const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
+  if (is_believed && ahead >= kToldSkew) {
+    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': its stamps are " << ahead
+                                              << " s ahead of the clock; their age counts from "
+                                                 "their receipt; compare the clocks");
+  }
+  // A message that came later has an earlier stamp because the clock of its sender went back. Maps
+  // come one by one, so that any earlier stamp says so. A message that is stale already does not
+  // replace one that is not.
+  if (problem.empty() && is_believed && went_back(stamp) > (is_map_ ? 0.0 : kMaxDisorder) &&
+      -ahead <= config_.timeout) {
+    start_again(stamp);
+  }
+  const bool is_same = measurement.content == content_;
+  content_ = measurement.content;
+  const bool is_used = problem.empty() && !(is_believed && stamp < in_use_);
+  update([&](SourceReport* report) {
+    ++report->messages;
+    report->has_been_there = true;
+    if (is_believed) {
+      report->newest = std::fmax(report->newest, stamp.toSec() - std::fmax(ahead, 0.0));
+      report->ahead = ahead;
+    }
+    if (content_ != 0 && !(is_same && report->same_since <= ros::Time::now().toSec())) {
+      report->same_since = ros::Time::now().toSec();
+    }
+    if (is_believed && stamp < in_use_) {
+      ++report->out_of_order;
+      if (went_back(stamp) <= kMaxDisorder) return;
+      report->problem = "its " + noun_ + "s " +
+                        format_text("are stamped %.2f s before the one in use and are stale: ",
+                                    went_back(stamp)) +
+                        "has the sender's clock gone back?";
+      return;
+    }
+    // The wait of other messages for tf remains a problem until one is used or this one is old.
+    if (!waits_for_tf_ || ahead < -config_.timeout) report->problem.clear();
+    report->doubt = measurement.doubt;
+    if (problem.empty()) return;
+    report->problem = problem;
+    ++report->unusable;
+    waits_for_tf_ = false;
+  });
+  if (!is_used) return;
+  auto kept = std::make_shared<const Measurement>(std::move(measurement));
+  if (is_map_) {
+    last_map_ = std::move(kept);
+    map_is_new_ = true;
+    return;
+  }
+  const std::size_t dropped = waiting_.add(std::move(kept));
+  update([dropped](SourceReport* report) { report->unusable += dropped; });
+}
+
+/// Says why a message cannot be used; empty: it can.
+std::string SensorSource::check(const Measurement& measurement) const {
+  const std_msgs::Header& header = measurement.header;
+  const std::string plural = "its " + noun_ + "s ";
+  if (header.stamp.isZero()) return plural + "have no stamp (0): the driver must set header.stamp";
+  const double ahead = seconds_between(ros::Time::now(), header.stamp);
+  if (ahead > future_tolerance(config_.timeout)) {
+    return plural + format_text("are stamped %.2f s in the future: ", ahead) +
+           "compare the clocks of sensor and node";
+  }
+  const std::size_t name_length = header.frame_id.size();
+  if (name_length == 0) return plural + "have an empty frame_id";
+  if (name_length > kMaxFrameName) {
+    return plural + "have a frame_id of " + std::to_string(name_length) +
+           " characters, allowed are at most " + std::to_string(kMaxFrameName);
+  }
+  if (!measurement.fault.empty()) return measurement.fault;
+  return target_.model || is_map_ ? "" : "it waits for the robot's model";
+}
+
+/// [s] How much earlier a stamp is than the newest one that is in use or waits; negative: it is
+/// later.
+double SensorSource::went_back(const ros::Time& stamp) const {
+  const ros::Time newest =
+      waiting_.empty() ? in_use_ : std::max(in_use_, waiting_.newest().header.stamp);
+  return newest.isZero() ? -1.0 : seconds_between(stamp, newest);
+}
+
+void SensorSource::start_again(const ros::Time& stamp) {
+  ROS_WARN_STREAM_THROTTLE(
+      5.0, "source '" << config_.name << "': the stamps of its " << noun_ << "s went "
+                      << format_text("back by %.2f s", went_back(stamp))
+                      << "; the sender has started again, and its messages are used from now on");
+  waiting_.clear();
+  in_use_ = ros::Time();
+  update([](SourceReport* report) {
+    ++report->restarts;
+    report->newest = std::numeric_limits<double>::quiet_NaN();
+  });
+}
+
+/// Drops measurements that have waited so long that they are stale.
+void SensorSource::drop_overdue() {
+  const std::size_t dropped = waiting_.drop_overdue(ros::Time::now(), config_.timeout);
+  if (dropped > 0) update([&](SourceReport* report) { report->unusable += dropped; });
+}
+
+/// Uses the newest measurement whose poses are known. The wait for tf becomes a problem only when
+/// the newest measurement has waited unusually long.
+void SensorSource::place_newest() {
+  const auto now = std::chrono::steady_clock::now();
+  if (waiting_.empty()) {
+    waits_since_ = now;
+    return;
+  }
+  std::string wait;  // why the newest waits
+  const std::size_t i = waiting_.newest_ready([&](const Measurement& measurement) {
+    const std::string problem = placer_.missing_transform(measurement, target_);
+    if (&measurement == &waiting_.newest()) wait = problem;
+    return problem.empty();
+  });
+  const std::chrono::duration<double> waits = now - waits_since_;
+  if (!wait.empty() && waits.count() >= 0.5 * std::min(config_.timeout, 1.0)) {
+    set_problem(wait + clock_difference(waiting_.newest()), false);
+    waits_for_tf_ = true;
+  }
+  if (i == waiting_.size()) return;
+  waits_since_ = now;
+  begin_work();
+  const std::string problem = use(waiting_[i]);
+  end_work();
+  waits_for_tf_ = false;
+  set_problem(problem, !problem.empty());
+  update([i](SourceReport* report) { report->overtaken += i; });
+  waiting_.drop_until(i);
+}
+
+void SensorSource::use_map() {
+  if (!last_map_ || !map_is_new_ || !target_.model) return;
+  map_is_new_ = false;
+  const std::string problem = use(*last_map_);
+  set_problem(problem, !problem.empty());
+}
+
+/// Turns a measurement into the newest snapshot.
+/// @returns empty on success, else a sentence
+std::string SensorSource::use(const Measurement& measurement) {
+  Placement placement;
+  const std::string problem = placer_.place(measurement, target_, &placement);
+  if (!problem.empty()) return problem;
+  SourceSnapshot& snapshot = exchange_.writable();
+  const bool is_shown = !is_map_ && filtered_.getNumSubscribers() > 0;
+  take_in(measurement, placement, is_shown, &snapshot);
+  note_view(placement, snapshot.cloud.view);
+  publish(snapshot, is_shown);
+  return "";
+}
+
+/// @param is_shown  on ~filtered_cloud, which is not cropped at the region of interest
+void SensorSource::take_in(const Measurement& measurement, const Placement& placement,
+                           bool is_shown, SourceSnapshot* snapshot) {
+  ingest_.set_region_of_interest(is_shown ? RegionOfInterest() : target_.region);
+  measurement.take_in(placement, &ingest_, &snapshot->cloud);
+  if (is_map_) snapshot->cloud.box_extent = map_extent(config_);
+  snapshot->stamp = measurement.header.stamp;
+  snapshot->counts_from = measurement.counts_from();
+  snapshot->model = target_.model;
+  snapshot->fixed_frame = target_.fixed_frame;
+  snapshot->map_frame = without_slash(measurement.header.frame_id);
+  snapshot->filtered = placement.known;
+  snapshot->generation = target_.generation;
+  snapshot->memory = memory_ ? memory_->take(measurement, placement, target_, *snapshot) : nullptr;
+  in_use_ = snapshot->stamp;
+}
+
+/// Hands a snapshot to queries. A warm-up that fails makes the next answer slower, and no cloud is
+/// lost for it. A map is placed when a query asks for it.
+void SensorSource::publish(const SourceSnapshot& snapshot, bool is_shown) {
+  if (is_shown) {
+    publish_message(filtered_, to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
+  }
+  double took = 0.0;
+  const std::string fault = exception_of([&] {
+    if (!is_map_) took = warm_up_(*this, snapshot);
+  });
+  if (!fault.empty()) {
+    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': warm-up failed: " << fault);
+  }
+  update([&](SourceReport* report) {
+    report->shown += is_shown ? 1 : 0;
+    report->warm_up_time = took;
+  });
+  exchange_.publish();
+}
+
+/// Notes what a self-filter by view found, and warns where it could not do its work.
+void SensorSource::note_view(const Placement& placement, const ViewReport& view) {
+  if (config_.ingest.self_filter_mode != SelfFilterMode::kView || placement.robot.empty()) return;
+  if (!view.is_used) {
+    ROS_WARN_STREAM_THROTTLE(
+        60.0, "source '" << config_.name << "': self_filter_mode is view, but its " << noun_
+                         << "s are no images seen from their frame's origin: the self-filter drops "
+                            "all that is within its padding");
+  } else if (view.has_drifted) {
+    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': " << doubt_of_view(view));
+  }
+  update([&](SourceReport* report) {
+    report->view = view;
+    report->view_links.resize(view.links.size());
+    for (std::size_t i = 0; i < view.links.size(); ++i) {
+      const InnerSphereTree* tree = placement.robot[view.links[i].solid].tree;
+      for (const LinkModel& link : target_.model->links) {
+        if (&link.tree == tree) report->view_links[i] = link.name;
+      }
+    }
+  });
+}
+
+void SensorSource::report(SourceReport* report) {
+  Source::report(report);
+  if (memory_) report->incomplete = memory_->loss();
+}
+
+}  // namespace ist

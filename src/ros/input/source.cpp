@@ -1,0 +1,216 @@
+#include "ros/input/source.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "ros/common/ros_time.h"
+#include "ros/common/text.h"
+#include "ros/common/thread_name.h"
+
+namespace ist {
+namespace {
+
+std::string place_of(const SourceConfig& config, const ros::NodeHandle& nh) {
+  const bool is_world = config.type == SourceType::kWorld;
+  if (is_world ? config.world.has_topic : config.file.empty()) return nh.resolveName(config.topic);
+  return config.file.empty() ? "~sources/" + config.name : config.file;
+}
+
+SourceReport report_of(const SourceConfig& config, const std::string& place) {
+  const bool is_world = config.type == SourceType::kWorld;
+  SourceReport report;
+  report.name = config.name;
+  report.is_file = is_world ? !config.world.has_topic : !config.file.empty();
+  report.topic = place;
+  report.type = message_type(config);
+  report.noun = noun(config.type);
+  report.timeout = config.timeout;
+  report.timeout_parameter = config.timeout_parameter;
+  report.required = config.required;
+  report.measures = !is_world && !config.is_permanent();
+  report.min_measured = config.min_measured;
+  report.frozen_after = config.frozen_after;
+  report.sensor_range = std::max(config.ingest.sensor_range, config.ingest.max_range);
+  if (config.ingest.self_filter) report.blind_skin = config.ingest.self_filter_padding;
+  report.by_view =
+      config.ingest.self_filter && config.ingest.self_filter_mode == SelfFilterMode::kView;
+  return report;
+}
+
+}  // namespace
+
+Source::Source(const SourceConfig& config, const ros::NodeHandle& nh, const TransformBuffer& buffer,
+               const std::string& own)
+    : config_(config),
+      buffer_(buffer),
+      is_placed_when_asked_(config.type == SourceType::kMap || config.type == SourceType::kWorld),
+      topic_advice_(nh.resolveName(config.topic), message_type(config), own),
+      report_(report_of(config, place_of(config, nh))) {}
+
+void Source::start() {
+  thread_ = std::thread([this] {
+    name_thread("ist " + config_.name);
+    run();
+  });
+}
+
+void Source::stop() {
+  running_ = false;
+  thread_.join();
+}
+
+void Source::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
+                       const RegionOfInterest& region, const std::vector<bool>& filters) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  newest_target_.model = std::move(model);
+  newest_target_.fixed_frame = fixed_frame;
+  newest_target_.region = region;
+  newest_target_.filters = filters;
+}
+
+SourceTarget Source::newest_target() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  return newest_target_;
+}
+
+const SourceSnapshot* Source::newest(const SnapshotRequest& request) {
+  const std::shared_ptr<SourceSnapshot>& snapshot = exchange_.newest();
+  if (!is_current(snapshot.get(), request.model)) return nullptr;
+  if (is_placed_when_asked_ && original_ != snapshot) {
+    original_ = snapshot;
+    placed_ = *snapshot;
+  }
+  std::string problem = is_placed_when_asked_
+                            ? place(request, &placed_)
+                            : buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame);
+  std::string doubt = doubt_of_place(*snapshot);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  placing_problem_ = std::move(problem);
+  report_.doubt_of_place = std::move(doubt);
+  if (!placing_problem_.empty()) return nullptr;
+  return is_placed_when_asked_ ? &placed_ : snapshot.get();
+}
+
+std::shared_ptr<const SourceSnapshot> Source::share(const SnapshotRequest& request) {
+  std::shared_ptr<const SourceSnapshot> snapshot = exchange_.share();
+  if (!is_current(snapshot.get(), request.model)) return nullptr;
+  if (!is_placed_when_asked_) {
+    const bool is_disputed = !buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame).empty();
+    return is_disputed ? nullptr : snapshot;
+  }
+  const auto placed = std::make_shared<SourceSnapshot>(*snapshot);
+  return place(request, placed.get()).empty() ? placed : nullptr;
+}
+
+/// Looks up where the frames of objects and of a map are.
+std::string Source::place(const SnapshotRequest& request, SourceSnapshot* snapshot) const {
+  const std::string& fixed = snapshot->fixed_frame;
+  std::vector<Eigen::Isometry3d>& X_FB = snapshot->world.X_FB;
+  snapshot->lags.resize(X_FB.size() + (snapshot->cloud.boxes ? 1 : 0));
+  std::string problem;
+  for (std::size_t i = 0; i < X_FB.size() && problem.empty(); ++i) {
+    const std::string& frame = snapshot->world.world->frames()[i];
+    problem = place_frame(fixed, frame, request, &X_FB[i], &snapshot->lags[i]);
+  }
+  if (!problem.empty() || !snapshot->cloud.boxes) return problem;
+  Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();
+  problem = place_frame(fixed, snapshot->map_frame, request, &X_FM, &snapshot->lags.back());
+  if (problem.empty()) snapshot->cloud.X_FM = X_FM * snapshot->X_BM;
+  return problem;
+}
+
+/// The first doubt about where the frames of a snapshot are; empty: none.
+std::string Source::doubt_of_place(const SourceSnapshot& snapshot) const {
+  const std::string& fixed = snapshot.fixed_frame;
+  for (std::size_t i = 0; i < snapshot.world.X_FB.size(); ++i) {
+    const std::string& frame = snapshot.world.world->frames()[i];
+    std::string doubt = is_in_tf(frame) ? doubt_of_pose(buffer_, fixed, frame) : "";
+    if (!doubt.empty()) return doubt;
+  }
+  return snapshot.map_frame.empty() ? "" : doubt_of_pose(buffer_, fixed, snapshot.map_frame);
+}
+
+std::string Source::place_frame(const std::string& fixed_frame, const std::string& frame,
+                                const SnapshotRequest& request, Eigen::Isometry3d* X_FB,
+                                Lag* lag) const {
+  return look_up_near(buffer_, fixed_frame, frame, request.time, request.max_age, X_FB, lag);
+}
+
+/// Whether a snapshot was made with `model`, or one of the same geometry, since the clock's last
+/// jump.
+bool Source::is_current(const SourceSnapshot* snapshot,
+                        const std::shared_ptr<const RobotModel>& model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  return snapshot && snapshot->model && model && same_geometry(*snapshot->model, *model) &&
+         (snapshot->generation == newest_target_.generation || config_.is_permanent());
+}
+
+void Source::report(SourceReport* report) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  *report = report_;
+  if (work_since_ != kNoWork) {
+    report->working = std::chrono::duration<double>(Clock::now() - work_since_).count();
+  }
+  if (!placing_problem_.empty()) report->problem = placing_problem_;
+}
+
+void Source::set_problem(const std::string& problem, bool dropped) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  report_.problem = problem;
+  if (dropped) ++report_.unusable;
+}
+
+void Source::begin_work() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  work_since_ = Clock::now();
+}
+
+void Source::end_work() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (work_since_ == kNoWork) return;
+  report_.last_work = std::chrono::duration<double>(Clock::now() - work_since_).count();
+  work_since_ = kNoWork;
+}
+
+std::optional<std::uint32_t> Source::count_publishers() {
+  const Clock::time_point now = Clock::now();
+  if (subscribers_.empty() || now < next_count_) return std::nullopt;
+  next_count_ = now + std::chrono::milliseconds(500);
+  const std::uint32_t publishers = subscribers_.front().getNumPublishers();
+  std::optional<std::string> advice;
+  if (!has_received_) advice = topic_advice_.ask();
+  update([&](SourceReport* report) {
+    report->publishers = publishers;
+    report->has_been_there |= publishers > 0;
+    if (advice) report->advice = *advice;
+  });
+  return publishers;
+}
+
+/// The caller holds mutex_.
+void Source::notice_clock_jump() {
+  const ros::Time now = ros::Time::now();
+  if (now < last_now_) {
+    ++newest_target_.generation;
+    newest_target_.set_back += seconds_between(now, last_now_);
+    if (!config_.is_permanent()) {
+      report_.messages = 0;
+      report_.newest = report_.same_since = std::numeric_limits<double>::quiet_NaN();
+      report_.problem.clear();
+    }
+  }
+  last_now_ = now;
+}
+
+std::string doubt_of_view(const ViewReport& view) {
+  if (!view.is_used || !view.has_drifted) return "";
+  return format_text("its points on the robot are %.1f mm off, ", 1e3 * view.offset) +
+         "more than three times what self_filter_view/position_error and angle_error say: "
+         "calibrate "
+         "the sensor; until then its self-filter drops all that is within the padding";
+}
+
+}  // namespace ist
