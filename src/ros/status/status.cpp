@@ -186,6 +186,11 @@ Status overall_status(const StatusInput& input, double now) {
                   "there are not known; state the true limits in the URDF");
   }
   sentences.add(ProximityArray::DEGRADED, input.pose_doubts);
+  for (const SourceReport& source : input.sources) {
+    if (source.doubt_of_place.empty()) continue;
+    sentences.add(ProximityArray::DEGRADED,
+                  "source '" + source.name + "': " + source.doubt_of_place);
+  }
   if (!input.unknown_space_problem.empty()) {
     sentences.add(ProximityArray::DEGRADED, input.unknown_space_problem);
   }
