@@ -94,7 +94,8 @@ CollisionRules read(const std::string& srdf_xml, const Kinematics* kinematics,
                            unknown_elements.text());
   }
   if (!unknown_links.empty()) {
-    rules.doubts.push_back("the SRDF names links that are not in the URDF: " + unknown_links.text());
+    rules.doubts.push_back("the SRDF names links that are not in the URDF: " +
+                           unknown_links.text());
   }
   return rules;
 }

@@ -69,11 +69,6 @@ Points room(test::Rng* rng, std::size_t n, double size) {
   return points;
 }
 
-PaddedBox box_of(const Eigen::AlignedBox3f& box) {
-  const Eigen::Vector3f &min = box.min(), &max = box.max();
-  return {{min.x(), min.y(), min.z(), 0.0F}, {max.x(), max.y(), max.z(), 0.0F}};
-}
-
 constexpr double kPeriod = 0.033;  // [s] of the clouds
 constexpr double kSearchDistance = 1.0;
 

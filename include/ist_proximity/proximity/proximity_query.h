@@ -140,8 +140,8 @@ class ProximityQuery {
   void set_config(const QueryConfig& config);
   const QueryConfig& config() const;          ///< settings of the next run()
   const QueryStatistics& statistics() const;  ///< of the last run()
-  const RobotModel& model() const;  ///< the one given to the constructor
-  std::size_t memory() const;       ///< [bytes] of its working memory, without the model
+  const RobotModel& model() const;            ///< the one given to the constructor
+  std::size_t memory() const;                 ///< [bytes] of its working memory, without the model
 
  private:
   struct Impl;
