@@ -193,18 +193,30 @@ class Check : public tinyxml2::XMLVisitor {
   std::string fault_;
 };
 
+// Assimp's own conversion differs from version to version.
+std::string unit_of(const tinyxml2::XMLDocument& document) {
+  const XMLElement* root = document.FirstChildElement("COLLADA");
+  const XMLElement* asset = root != nullptr ? root->FirstChildElement("asset") : nullptr;
+  const XMLElement* unit = asset != nullptr ? asset->FirstChildElement("unit") : nullptr;
+  const char* text = unit != nullptr ? unit->Attribute("meter") : nullptr;
+  return text != nullptr ? text : "";
+}
+
 }  // namespace
 
-std::string collada_fault(const std::string& bytes, std::string* readable) {
+std::string collada_fault(const std::string& bytes, std::string* readable, std::string* unit) {
   tinyxml2::XMLDocument document;
   const tinyxml2::XMLError error = document.Parse(bytes.data(), bytes.size());
-  if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) return {};  // load_mesh() says that
+  if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {  // assimp would nest calls as deep
+    return "nests its XML elements too deep; export or download it again";
+  }
   // Assimp would read on: its own XML reader takes what is not well-formed.
   if (error != tinyxml2::XML_SUCCESS) {
     return std::string("cannot be read as a mesh (XML that is not well-formed: ") +
            document.ErrorName() + ", line " + std::to_string(document.ErrorLineNum()) +
            "); export or download it again";
   }
+  if (unit != nullptr) *unit = unit_of(document);
   Check check;
   document.Accept(&check);
   if (readable == nullptr || !check.fault().empty() || check.empty().empty()) return check.fault();

@@ -12,7 +12,9 @@ namespace ist {
 /// @param bytes     the file
 /// @param readable  may be null, or `bytes`; written where primitives with a count of 0 have to be
 ///                  taken out for assimp
+/// @param unit      may be null; receives the text of <unit meter="...">, empty where there is none
 /// @returns an empty string, or what is wrong with the file ("holds ...", "cannot be read ...")
-std::string collada_fault(const std::string& bytes, std::string* readable = nullptr);
+std::string collada_fault(const std::string& bytes, std::string* readable = nullptr,
+                          std::string* unit = nullptr);
 
 }  // namespace ist

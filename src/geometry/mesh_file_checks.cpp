@@ -72,6 +72,18 @@ std::string off_fault(const std::string& head, std::size_t size) {
   return "";
 }
 
+// Binary files may begin with "solid", too. The last byte of the number of facets is 0 in them, as
+// no file is large enough for 16 million; a text has no zeros.
+bool is_binary_stl(const std::string& bytes) {
+  return bytes.size() >= kStlHead && bytes[kStlHead - 1] == '\0';
+}
+
+std::size_t announced_facets(const std::string& bytes) {
+  std::uint32_t facets = 0;
+  std::memcpy(&facets, &bytes[kStlHead - sizeof facets], sizeof facets);
+  return facets;
+}
+
 }  // namespace
 
 std::string mesh_format(const std::string& path) {
@@ -89,20 +101,16 @@ std::string format_fault(const std::string& format) {
 }
 
 std::string normalize_stl(std::string* bytes) {
-  constexpr std::size_t kHead = 84, kFacet = 50, kTail = 4096;
-  // Binary files may begin with "solid", too. The last byte of the number of facets is 0 in them,
-  // as no file is large enough for 16 million; a text has no zeros.
-  if (bytes->size() >= kHead && (*bytes)[kHead - 1] == '\0') {
-    std::uint32_t facets = 0;
-    std::memcpy(&facets, &(*bytes)[kHead - sizeof facets], sizeof facets);
-    const std::size_t size = kHead + kFacet * std::size_t{facets};
-    if (bytes->size() < size || bytes->size() >= size + kFacet) {
+  constexpr std::size_t kTail = 4096;
+  if (is_binary_stl(*bytes)) {
+    const std::size_t facets = announced_facets(*bytes), size = kStlHead + kStlFacet * facets;
+    if (bytes->size() < size || bytes->size() >= size + kStlFacet) {
       return "announces " + std::to_string(facets) + " facets, which take " + std::to_string(size) +
              " bytes, and has " + std::to_string(bytes->size()) +
              (bytes->size() < size ? ": it is cut off" : ": it is damaged, or of several parts") +
              "; export or download it again";
     }
-    bytes->resize(size);  // assimp takes a file with a few bytes more for no STL file
+    bytes->resize(size);
     return "";
   }
   if (lower_case(bytes->substr(0, 5)) != "solid") return "";
@@ -110,6 +118,10 @@ std::string normalize_stl(std::string* bytes) {
   if (ends_solid(bytes->substr(bytes->size() - std::min(kTail, bytes->size())))) return "";
   return "is cut off: an STL file that begins with 'solid' ends with 'endsolid'; export or "
          "download it again";
+}
+
+std::size_t binary_stl_facets(const std::string& bytes) {
+  return is_binary_stl(bytes) ? announced_facets(bytes) : 0;
 }
 
 std::string declared_size_fault(const std::string& format, const std::string& bytes) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 /// Checks of a mesh file's bytes before assimp reads them. Each returns an empty string, or what is
@@ -17,6 +18,11 @@ std::string format_fault(const std::string& format);
 /// facets. A text must end with 'endsolid': assimp accepts half a file, and half a link would be an
 /// unsafe link.
 std::string normalize_stl(std::string* bytes);
+
+/// The facets of a binary STL file that normalize_stl() has passed; 0: it is a text, or has none.
+/// Each takes kStlFacet bytes, from kStlHead on: 12 bytes of a normal, 9 floats, 2 bytes.
+std::size_t binary_stl_facets(const std::string& bytes);
+constexpr std::size_t kStlHead = 84, kStlFacet = 50, kStlNormal = 12;
 
 /// PLY and OFF files begin with the numbers of their elements, for which assimp takes memory before
 /// it reads them. A file cannot hold more elements than bytes.

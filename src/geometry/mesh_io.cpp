@@ -1,13 +1,13 @@
 #include "internal/geometry/mesh_io.h"
 
 #include <assimp/scene.h>
-#include <tinyxml2.h>
 
 #include <Eigen/Geometry>
 #include <array>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <locale>
 #include <sstream>
 #include <unordered_map>
@@ -28,7 +28,8 @@ namespace {
   throw ModelError("mesh file '" + printable(path) + "' " + what);
 }
 
-std::string read_mesh_file(const std::string& path, const CancelRequest& cancelled) {
+std::string read_mesh_file(const std::string& path, const CancelRequest& cancelled,
+                           std::string* unit) {
   std::string bytes;
   const std::string fault = read_regular_file(path, kMaxMeshFileSize, &bytes, cancelled);
   if (fault == "does not exist") {
@@ -40,7 +41,7 @@ std::string read_mesh_file(const std::string& path, const CancelRequest& cancell
   for (const std::string& damage :
        {format_fault(format), declared_size_fault(format, bytes),
         format == "stl" ? normalize_stl(&bytes) : std::string(),
-        format == "dae" ? collada_fault(bytes, &bytes) : std::string()}) {
+        format == "dae" ? collada_fault(bytes, &bytes, unit) : std::string()}) {
     if (!damage.empty()) fail(path, damage);
   }
   return bytes;
@@ -52,20 +53,10 @@ void check_scale(const std::string& path, const Eigen::Vector3d& scale) {
 }
 
 // Metres per unit of a Collada file. It is read here, as in rviz. Assimp's root node, which holds
-// its own conversion of unit and up-axis, is skipped, because that differs from version to version.
-// @throws ModelError also for a file that must not reach assimp
-double collada_unit(const std::string& path, const std::string& bytes) {
-  tinyxml2::XMLDocument document;
-  const tinyxml2::XMLError error = document.Parse(bytes.data(), bytes.size());
-  if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {  // assimp would nest calls as deep
-    fail(path, "nests its XML elements too deep; export or download it again");
-  }
-  if (error != tinyxml2::XML_SUCCESS) return 1.0;  // assimp reports it
-  const tinyxml2::XMLElement* root = document.FirstChildElement("COLLADA");
-  const tinyxml2::XMLElement* asset = root != nullptr ? root->FirstChildElement("asset") : nullptr;
-  const tinyxml2::XMLElement* unit = asset != nullptr ? asset->FirstChildElement("unit") : nullptr;
-  const char* text = unit != nullptr ? unit->Attribute("meter") : nullptr;
-  if (text == nullptr) return 1.0;
+// its own conversion of unit and up-axis, is skipped.
+// @param text  of <unit meter="...">
+double collada_unit(const std::string& path, const std::string& text) {
+  if (text.empty()) return 1.0;
   std::istringstream stream(text);
   stream.imbue(std::locale::classic());
   double meter = 0.0;
@@ -95,6 +86,17 @@ class MeshBuilder {
     add_children(scene, node, X_MN);
   }
 
+  // Assimp would take a second for a million facets, and not stop.
+  void add_binary_stl(const std::string& bytes, std::size_t facets) {
+    for (std::size_t f = 0; f < facets; ++f) {
+      watch_.step();
+      std::array<float, 9> numbers{};
+      std::memcpy(numbers.data(), &bytes[kStlHead + f * kStlFacet + kStlNormal], sizeof numbers);
+      const Eigen::Map<const Eigen::Matrix3f> corners(numbers.data());
+      add_triangle(corners.cast<double>(), Eigen::Affine3d::Identity());
+    }
+  }
+
   void add_children(const aiScene& scene, const aiNode& node, const Eigen::Affine3d& X_MN) {
     for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(scene, *node.mChildren[i], X_MN);
   }
@@ -110,27 +112,36 @@ class MeshBuilder {
   };
 
   void add_mesh(const aiMesh& mesh, const Eigen::Affine3d& X_MN) {
-    // A mirror reverses the corners' order; swapping two of them keeps outside outside.
-    const bool mirrored = (scale_.prod() < 0.0) != (X_MN.linear().determinant() < 0.0);
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       watch_.step();
       const aiFace& face = mesh.mFaces[f];
       if (face.mNumIndices != 3) continue;
-      if (mesh_.triangles.size() == kMaxTriangles) {
-        fail(path_, "has more than " + std::to_string(kMaxTriangles) +
-                        " triangles; simplify it, a few ten thousand are plenty for a link");
-      }
-      TriangleMesh::Triangle triangle;
+      Eigen::Matrix3d corners;
       for (unsigned k = 0; k < 3; ++k) {
-        triangle[k] = vertex(mesh.mVertices[face.mIndices[k]], X_MN);
+        const aiVector3D& v = mesh.mVertices[face.mIndices[k]];
+        corners.col(k) << v.x, v.y, v.z;
       }
-      if (mirrored) std::swap(triangle[1], triangle[2]);
-      mesh_.triangles.push_back(triangle);
+      add_triangle(corners, X_MN);
     }
   }
 
-  std::uint32_t vertex(const aiVector3D& v, const Eigen::Affine3d& X_MN) {
-    const Eigen::Vector3d p = scale_.cwiseProduct(X_MN * Eigen::Vector3d(v.x, v.y, v.z));
+  // @param corners  of the node N, by column
+  void add_triangle(const Eigen::Matrix3d& corners, const Eigen::Affine3d& X_MN) {
+    if (mesh_.triangles.size() == kMaxTriangles) {
+      fail(path_, "has more than " + std::to_string(kMaxTriangles) +
+                      " triangles; simplify it, a few ten thousand are plenty for a link");
+    }
+    TriangleMesh::Triangle triangle;
+    for (int k = 0; k < 3; ++k) {
+      triangle[static_cast<std::size_t>(k)] = vertex(scale_.cwiseProduct(X_MN * corners.col(k)));
+    }
+    // A mirror reverses the corners' order; swapping two of them keeps outside outside.
+    const bool mirrored = (scale_.prod() < 0.0) != (X_MN.linear().determinant() < 0.0);
+    if (mirrored) std::swap(triangle[1], triangle[2]);
+    mesh_.triangles.push_back(triangle);
+  }
+
+  std::uint32_t vertex(const Eigen::Vector3d& p) {
     if (!(p.cwiseAbs().maxCoeff() <= kMaxLength && p.allFinite())) {
       std::ostringstream text;
       text << "has a vertex at (" << p.transpose() << ") after its transforms and scale ("
@@ -158,23 +169,28 @@ class MeshBuilder {
 TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale,
                        const CancelRequest& cancelled) {
   check_scale(path, scale);
-  const std::string bytes = read_mesh_file(path, cancelled);
-  const bool is_collada = mesh_format(path) == "dae";
-  const double unit = is_collada ? collada_unit(path, bytes) : 1.0;
-  Assimp::Importer importer;
-  std::string reason;
-  const aiScene* scene = import_mesh(path, bytes, cancelled, &importer, &reason);
-  if (scene == nullptr) {
-    fail(path, "cannot be read as a mesh (" + printable(reason) +
-                   "); STL, DAE and OBJ are known to work");
-  }
-  const Eigen::Affine3d X_MR = Eigen::Affine3d::Identity();
-  MeshBuilder builder(path, unit * scale, cancelled);
-  if (is_collada) {
-    // The root holds nothing but assimp's conversion of unit and up-axis.
-    builder.add_children(*scene, *scene->mRootNode, X_MR);
+  std::string unit_text;
+  const std::string bytes = read_mesh_file(path, cancelled, &unit_text);
+  const std::string format = mesh_format(path);
+  MeshBuilder builder(path, collada_unit(path, unit_text) * scale, cancelled);
+  const std::size_t facets = format == "stl" ? binary_stl_facets(bytes) : 0;
+  if (facets > 0) {
+    builder.add_binary_stl(bytes, facets);
   } else {
-    builder.add_node(*scene, *scene->mRootNode, X_MR);
+    Assimp::Importer importer;
+    std::string reason;
+    const aiScene* scene = import_mesh(path, bytes, cancelled, &importer, &reason);
+    if (scene == nullptr) {
+      fail(path, "cannot be read as a mesh (" + printable(reason) +
+                     "); STL, DAE and OBJ are known to work");
+    }
+    const Eigen::Affine3d X_MR = Eigen::Affine3d::Identity();
+    if (format == "dae") {
+      // The root holds nothing but assimp's conversion of unit and up-axis.
+      builder.add_children(*scene, *scene->mRootNode, X_MR);
+    } else {
+      builder.add_node(*scene, *scene->mRootNode, X_MR);
+    }
   }
   TriangleMesh mesh = builder.take();
   if (mesh.triangles.empty()) {
