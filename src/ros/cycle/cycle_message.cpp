@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "internal/robot/anytime_model.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
 #include "ros/output/message_conversion.h"
@@ -55,6 +56,24 @@ void fill_without_model(const ModelState& model, const ServerConfig& config, con
   report->take(input, status);
   report->links_monitored = model.links.size();
   report->links_known = 0;
+}
+
+std::vector<std::string> faulty_links(const RobotModel& robot,
+                                      const std::vector<std::size_t>& monitored) {
+  constexpr std::size_t kFew = 6, kTold = 3;
+  std::vector<std::string> reasons, names;
+  for (const std::size_t i : monitored) {
+    const LinkModel& link = robot.links[i];
+    if (link.usable() || is_pending(link)) continue;
+    reasons.push_back(link.error);
+    names.push_back(quoted(link.name));
+  }
+  if (reasons.size() <= kFew) return reasons;
+  reasons.resize(kTold);
+  names.erase(names.begin(), names.begin() + kTold);
+  reasons.push_back("nor can the geometry of " + join(names, ", ") +
+                    " be used: the diagnostics of the model give the reasons");
+  return reasons;
 }
 
 std::vector<std::string> missing_poses(const RobotModel& robot,

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "internal/proximity/deadline.h"
-#include "internal/robot/anytime_model.h"
 #include "ist_proximity/repulsion/object_repulsion.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/stopwatch.h"
@@ -54,10 +53,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
       wrenches_(robot_.links.size(), Wrench::unknown()) {
   set_problem(*model_);
-  for (const std::size_t i : model_->monitored) {
-    const LinkModel& link = robot_.links[i];
-    if (!link.usable() && !is_pending(link)) status_input_.link_errors.push_back(link.error);
-  }
+  status_input_.link_errors = faulty_links(robot_, model_->monitored);
 }
 
 void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,

@@ -12,6 +12,7 @@
 #include "ros/common/exceptions.h"
 #include "ros/common/publish.h"
 #include "ros/common/thread_name.h"
+#include "ros/cycle/cycle_message.h"
 #include "ros/output/message_conversion.h"
 #include "ros/output/message_invariants.h"
 #include "ros/poses/joint_pose_source.h"
@@ -222,15 +223,10 @@ void SelfProximity::publish_once() {
     message->unfinished = static_cast<std::uint32_t>(input.deadline.unfinished);
     compute_wrenches(live, end_of(live.query.deadline, 1.0, begin), &input.deadline);
     message->header.stamp = poses_.stamp;
-    for (const std::size_t i : model_->monitored) {
-      const LinkModel& link = model_->robot->links[i];
-      if (!link.usable()) input.link_errors.push_back(link.error);
-      if (!poses_.problems[i].empty()) {
-        input.pose_problems.push_back("link '" + link.name +
-                                      "' has no pose: " + poses_.problems[i].text);
-      }
-      add_link(i, live.repulsion, message.get());
-    }
+    const RobotModel& robot = *model_->robot;
+    input.link_errors = faulty_links(robot, model_->monitored);
+    input.pose_problems = missing_poses(robot, model_->monitored, poses_, pose_source_.get());
+    for (const std::size_t i : model_->monitored) add_link(i, live.repulsion, message.get());
     const std::chrono::duration<double> took = Clock::now() - begin;
     message->computation_time = took.count();
   } else {

@@ -42,7 +42,7 @@ struct DeadlineCost {
 struct StatusInput {
   std::string model_problem;             ///< not empty: there is no model, or not all of it (yet)
   bool is_loading = false;               ///< `model_problem` says how far the model is
-  std::vector<std::string> link_errors;  ///< monitored links without usable geometry
+  std::vector<std::string> link_errors;  ///< sentences on links without usable geometry
   std::vector<SourceReport> sources;
   std::vector<Status> source_statuses;     ///< by source
   std::vector<std::string> pose_problems;  ///< one sentence each
