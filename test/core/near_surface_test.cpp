@@ -126,8 +126,8 @@ TEST(NearSurface, TheSideIsThatOfDoublePrecisionHoweverLargeTheMesh) {
       }
     }
   }
-  EXPECT_GT(inside, test::scaled(3000));
-  EXPECT_GT(outside, test::scaled(3000));
+  EXPECT_GT(inside, test::scaled(2500));
+  EXPECT_GT(outside, test::scaled(2500));
 }
 
 }  // namespace
