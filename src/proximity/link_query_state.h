@@ -50,7 +50,7 @@ struct LinkContext {
   }
 };
 
-/// What is to be proven of a link.
+/// The part of a link's answer that is to be proven.
 enum class Goal {
   kFree,       ///< that it is free, where it is
   kHalf,       ///< its distance, to within half of it

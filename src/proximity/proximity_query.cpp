@@ -177,7 +177,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
     proven = std::min(proven, link.proven_bound());
     proven_points = std::min(proven_points, link.proven_points_bound());
     nearest.extents = std::min(nearest.extents, link.extent_distance());
-    // With extents a link in range may have a nearest point that is farther than another link's.
+    // A link in range may have a nearest point that is farther than another link's, by extents.
     const bool is_nearer = link.distance() < nearest.distance;
     if (best == count || (link.is_in_range() == best_in_range ? is_nearer : !best_in_range)) {
       best = i;

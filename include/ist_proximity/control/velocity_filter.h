@@ -22,7 +22,7 @@ struct JointLimits {
 /// The limits that a URDF states for positions, with one speed for all joints.
 JointLimits joint_limits(const Kinematics& kinematics, double speed);
 
-/// What a filter made of a command.
+/// The outcome of a command.
 enum class FilterStatus : std::uint8_t {
   kFree = 0,     ///< the command meets all bounds and is given as it is
   kLimited = 1,  ///< the nearest velocity that meets all bounds
@@ -68,9 +68,9 @@ std::string describe(const FilterAnswer& answer, const ConstraintRows& rows,
 /// Position limits: no joint passes its limit within the rows' horizon, and one that is beyond it
 /// moves back only. Acceleration limits hold from the last answer to this one, within `period`.
 ///
-/// Where no velocity meets all bounds, or the time is over, the answer is the command times the
-/// largest factor from 0 to 1 that meets rows, speed and position limits, and 0 where none does;
-/// acceleration limits give way to it. Nothing that violates a row is given but 0, which may when
+/// The answer is the command times the largest factor from 0 to 1 that meets rows, speed and
+/// position limits, or 0, where no velocity meets all bounds or the time is over; acceleration
+/// limits give way to it. Nothing that violates a row is given but 0, which may when
 /// a row asks for a retreat. Any fault of the input gives 0.
 ///
 /// run() allocates nothing, locks nothing and never throws. One object per thread.

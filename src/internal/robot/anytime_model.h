@@ -33,7 +33,7 @@ class AnytimeModel {
   AnytimeModel& operator=(const AnytimeModel&) = delete;
   ~AnytimeModel();
 
-  /// What shapes are packed to.
+  /// The goal that shapes are packed to.
   enum class Stage {
     kFirst,  ///< a few dozen spheres a shape, unless its final packing is in the cache
     kFinal,  ///< config.packing
