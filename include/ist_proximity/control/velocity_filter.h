@@ -15,7 +15,8 @@ namespace ist {
 /// Limits of a robot's joints, by column of ConstraintRows.
 struct JointLimits {
   std::vector<double> speed;         ///< [rad/s, m/s] > 0, may be +inf
-  std::vector<double> lower, upper;  ///< [rad, m] of positions, may be infinite; empty: none
+  std::vector<double> lower;         ///< [rad, m] of positions, may be -inf; empty: none
+  std::vector<double> upper;         ///< [rad, m] the same, may be +inf
   std::vector<double> acceleration;  ///< [rad/s^2, m/s^2] > 0, may be +inf; empty: none
 };
 
@@ -47,8 +48,8 @@ const char* sentence(FilterReason reason);
 /// A velocity that may be commanded, and why.
 struct FilterAnswer {
   std::vector<double> velocity;  ///< [rad/s, m/s] by joint; finite, whatever was given
-  FilterStatus status = FilterStatus::kFault;
-  FilterReason reason = FilterReason::kRows;
+  FilterStatus status = FilterStatus::kFault;  ///< what was made of the command
+  FilterReason reason = FilterReason::kRows;   ///< why it is not the nearest velocity
   /// Rows that hold the velocity back, or that contradict one another; some twice.
   std::vector<std::size_t> rows;
   std::vector<std::size_t> joints;  ///< joints that are at a limit of theirs, likewise
