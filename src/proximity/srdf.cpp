@@ -33,7 +33,7 @@ std::string link_of(const tinyxml2::XMLElement& element, const char* attribute) 
   throw ModelError("the SRDF has a " + place_of(element) + " without " + attribute);
 }
 
-// What a sentence tells: the first few by name.
+// The names that a sentence tells: the first few.
 class Named {
  public:
   void add(const std::string& text) {

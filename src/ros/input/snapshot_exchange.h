@@ -29,9 +29,9 @@ struct SourceSnapshot {
   std::string fixed_frame, map_frame;  ///< the frames between which the cloud or map is placed
   /// The map's boxes -> `map_frame`.
   Eigen::Isometry3d X_BM = Eigen::Isometry3d::Identity();
-  /// Of the frames of a map or of known objects whose poses are late.
+  /// The lags of the frames of a map or of known objects whose poses are late.
   std::vector<Lag> lags;
-  /// What the source remembers and the cloud does not show; null: nothing.
+  /// The obstacles that the source remembers and the cloud does not show; null: none.
   std::shared_ptr<const SourceSnapshot> memory;
   /// A known world, and the surfaces of the model's links; null: a cloud. The boxes of the cloud
   /// belong to the world then.

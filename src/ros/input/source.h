@@ -26,7 +26,7 @@
 
 namespace ist {
 
-/// What a snapshot is asked for.
+/// The question to a source for its snapshot.
 struct SnapshotRequest {
   std::shared_ptr<const RobotModel> model;  ///< that it has to be made with
   ros::Time time;        ///< a map is placed where it is then, or else at the newest known instant
@@ -72,9 +72,9 @@ struct SourceTarget {
   }
 };
 
-/// What sensors, maps and known worlds have in common: a topic whose messages are turned into
+/// The common part of sensors, maps and known worlds: a topic whose messages are turned into
 /// snapshots by a thread of its own, so that neither a large message nor a late transform ever
-/// delays a query, and what is told of it. The lock is held for copies only.
+/// delays a query, and the report about it. The lock is held for copies only.
 ///
 /// When the ROS clock jumps back (a bag starts over), snapshots from before are no longer current,
 /// except for those of a source that is permanent.
