@@ -28,7 +28,8 @@ add_message_files(DIRECTORY msg FILES
   SourceStatus.msg
   SpeedScaleState.msg
   WorldObject.msg
-  WorldObjects.msg)
+  WorldObjects.msg
+  WorldOctomap.msg)
 add_service_files(DIRECTORY srv FILES
   AttachObject.srv
   DetachObject.srv

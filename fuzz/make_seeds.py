@@ -19,41 +19,6 @@ def write(target, name, content):
     (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
 
 
-def planning_scene(has_pose, kinds=("primitive", "mesh", "plane"), operation=0, octomap=b""):
-    """moveit_msgs/PlanningScene with one object; the first byte is the layout. The octomap is a binary tree."""
-
-    def u32(value):
-        return struct.pack("<I", value)
-
-    def text(value):
-        return u32(len(value)) + value.encode()
-
-    def header(frame):
-        return struct.pack("<3I", 0, 0, 0) + text(frame)
-
-    pose = struct.pack("<7d", 0.1, 0.2, 0.3, 0, 0, 0, 1)
-    one = header("world") + (pose if has_pose else b"") + text("object") + text("") * 2
-    shapes = {
-        "primitive": struct.pack("<BI3d", 1, 3, 0.1, 0.2, 0.3),
-        "mesh": u32(len(TRIANGLES))
-        + b"".join(struct.pack("<3I", *t) for t in TRIANGLES)
-        + u32(len(VERTICES))
-        + b"".join(struct.pack("<3d", *v) for v in VERTICES),
-        "plane": struct.pack("<4d", 0, 0, 1, 0.5),
-    }
-    for kind, shape in shapes.items():
-        one += (u32(1) + shape + u32(1) + pose) if kind in kinds else u32(0) * 2
-    one += u32(0) * 2 if has_pose else b""
-    one += bytes([operation])
-    joints = header("") + u32(0) * 4
-    result = bytes([has_pose]) + text("scene") + joints * 2 + u32(0) + b"\0" + text("robot") + u32(0)
-    result += u32(1) + text("object") + u32(1) + u32(1) + b"\1" + u32(0) * 2  # the matrix
-    result += u32(0) * 3 + u32(1) + one
-    kind = text("OcTree") + struct.pack("<d", 0.05) if octomap else text("") + bytes(8)
-    result += header("map" if octomap else "") + pose + header("")
-    return result + bytes([len(octomap) > 0]) + kind + u32(len(octomap)) + octomap + b"\0"
-
-
 def pseudo_random(target, lengths, count=4):
     for length in lengths:
         for number in range(count):
@@ -164,14 +129,6 @@ def scenes():
     new = "a cell\n"
     for i, shape in enumerate(shapes):
         new += f"* object {i}\n{pose}1\n{shape}{pose}{colour}0\n"
-    for has_pose in (False, True):
-        name = "pose" if has_pose else "no_pose"
-        write("planning_scene", name, planning_scene(has_pose))
-        write("planning_scene", name + "_append", planning_scene(has_pose, ("primitive",), 2))
-        write("planning_scene", name + "_move", planning_scene(has_pose, (), 3))
-    inner, occupied = struct.pack("<H", 3 << 14), struct.pack("<H", 2)
-    one_leaf = inner + struct.pack("<H", 3) * 14 + occupied
-    write("planning_scene", "octomap", planning_scene(True, ("primitive",), octomap=one_leaf))
     write("world_scene", "every_shape.scene", new + ".\n")
     old = "old\n* wall\n2\n" + "".join(s + pose + colour for s in shapes[:2])
     write("world_scene", "without_poses.scene", old + ".\n")

@@ -237,27 +237,6 @@ bool WorldBuilder::remove(const std::string& name) {
   return true;
 }
 
-bool WorldBuilder::set_allowed_links(const std::string& name, std::vector<std::string> links) {
-  const auto found = entries_.find(name);
-  if (found == entries_.end()) return false;
-  found->second.object.allowed_links = std::move(links);
-  return true;
-}
-
-std::optional<WorldObject> WorldBuilder::object(const std::string& name) const {
-  const auto found = entries_.find(name);
-  if (found == entries_.end()) return std::nullopt;
-  const KnownWorld::Object& known = found->second.object;
-  WorldObject object;
-  object.name = name;
-  object.frame = found->second.frame;
-  object.geometry = *known.geometry;
-  object.X_BO = known.X_BO;
-  object.margin = known.margin;
-  object.allowed_links = known.allowed_links;
-  return object;
-}
-
 void WorldBuilder::clear() {
   entries_.clear();
   triangles_ = shapes_ = 0;

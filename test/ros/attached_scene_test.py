@@ -8,7 +8,7 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from joint_states_test import ARM, arm_poses
-from planning_scene_test import APPEND, MOVE, REMOVE, Publisher
+from planning_scene_test import APPEND, MOVE, REMOVE, Bridge, Publisher
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import JointState
 
@@ -34,14 +34,16 @@ class AttachedSceneTest(unittest.TestCase):
         cls.world.start_tf()
         cls.scenes = Publisher("/attached/scene", True)
         cls.scenes.send(is_diff=False)
-        source = {"type": "world", "planning_scene": "scene", "max_objects": 10}
+        source = {"type": "world", "topic": "objects", "max_objects": 10}
         cls.node = pt.ProximityNode(
             "/attached", {"sources": {"moveit": source}, "max_distance": 1.5}, pt.urdf()
         )
+        cls.bridge = Bridge("/attached", "scene", "objects")
         cls.node.wait_for_status(ProximityArray.OK)
 
     @classmethod
     def tearDownClass(cls):
+        cls.bridge.stop()
         cls.node.stop()
         cls.world.stop()
 
@@ -248,13 +250,15 @@ class QueryTest(unittest.TestCase):
         # Between ball and box, whose gap it leaves is 2.5 slide - 0.05.
         cup = self.scenes.box("cup", (-0.3, 0, 0), frame="ball_link")
         self.scenes.send(attached=[self.scenes.attached("ball_link", cup)], is_diff=False)
-        source = {"type": "world", "planning_scene": "scene"}
+        source = {"type": "world", "topic": "objects"}
         self.node = pt.ProximityNode("/carried", {"sources": {"moveit": source}, "max_distance": 3.0}, ARM)
+        self.bridge = Bridge("/carried", "scene", "objects")
         self.node.wait_for_status(ProximityArray.OK)
         self.ask = rospy.ServiceProxy("/carried/proximity/query", QueryProximity)
         self.ask.wait_for_service(pt.TIMEOUT)
 
     def tearDown(self):
+        self.bridge.stop()
         self.assertEqual(self.node.stop(), 0)
         self.world.stop()
 

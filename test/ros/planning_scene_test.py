@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 """moveit_msgs/PlanningScene as a known world: of Noetic and of Melodic, as genpy writes them."""
 
+import atexit
 import math
 import struct
+import subprocess
 import sys
+import tempfile
 import unittest
 
 import proximity_testing as pt
@@ -22,6 +25,37 @@ def pose(x=0.0, y=0.0, z=0.0):
     result.position.x, result.position.y, result.position.z = x, y, z
     result.orientation.w = 1.0
     return result
+
+
+class Bridge:
+    """Runs planning_scene_bridge in a namespace, as a process of the test."""
+
+    def __init__(self, namespace, scenes, objects, *arguments):
+        command = [
+            pt.find_program("ist_proximity", "planning_scene_bridge"),
+            "__ns:=" + namespace,
+            "__name:=bridge_of_" + objects,
+            "planning_scene:=" + scenes,
+            "world_objects:=" + objects,
+            "/tf:=" + namespace + "/tf",
+            "/tf_static:=" + namespace + "/tf_static",
+        ]
+        self.log = tempfile.TemporaryFile()
+        self.process = subprocess.Popen(command + list(arguments), stdout=self.log, stderr=subprocess.STDOUT)
+        atexit.register(self.process.kill)
+
+    def stop(self):
+        self.process.terminate()
+        self.process.wait()
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+
+    def errors(self):
+        """The lines that it has printed, of errors."""
+        self.log.seek(0)
+        return [line for line in self.log.read().decode().splitlines() if "ERROR" in line or "Traceback" in line]
 
 
 class Publisher:
@@ -112,23 +146,28 @@ class PlanningSceneTest(unittest.TestCase):
                 "sources": {
                     "noetic": {
                         "type": "world",
-                        "planning_scene": "monitored_planning_scene",
+                        "topic": "objects",
                         "objects": {"post": post},
                         "max_objects": 100,
                     },
                     "melodic": {
                         "type": "world",
-                        "planning_scene": "old_planning_scene",
-                        "starts_empty": True,
+                        "topic": "old_objects",
                     },
                 },
                 "links": ["ball_link"],
             },
             pt.urdf(),
         )
+        cls.bridges = [
+            Bridge("/scenes", "monitored_planning_scene", "objects"),
+            Bridge("/scenes", "old_planning_scene", "old_objects", "_starts_empty:=true"),
+        ]
 
     @classmethod
     def tearDownClass(cls):
+        for bridge in cls.bridges:
+            bridge.stop()
         cls.node.stop()
         cls.world.stop()
 
@@ -277,9 +316,10 @@ class PlanningSceneTest(unittest.TestCase):
         world.start_tf()
         node = pt.ProximityNode(
             "/late",
-            {"sources": {"late": {"type": "world", "planning_scene": "/scenes/late"}}, "links": ["ball_link"]},
+            {"sources": {"late": {"type": "world", "topic": "objects"}}, "links": ["ball_link"]},
             pt.urdf(),
         )
+        bridge = Bridge("/late", "/scenes/late", "objects")
         try:
             node.wait_for_status(ProximityArray.NO_CLOUD)
             late.send(late.box("part", (0, 0.35, 0)))
@@ -303,8 +343,8 @@ class PlanningSceneTest(unittest.TestCase):
             node.wait_for(lambda m: abs(pt.link(m, "ball_link").distance - 0.1) < 1e-6, "its move")
             service.shutdown()
             # A publisher of the older layout: a service of the one md5sum refuses the other.
-            old = Publisher("/scenes/late", False)
             late.stop()
+            old = Publisher("/scenes/late", False)
             service, requests = old.serve("/late/get_planning_scene", old.box("part", (0, 0.45, 0)))
             old.send(old.box("other", (0, 0, 0.9)))
             node.wait_for(
@@ -315,8 +355,43 @@ class PlanningSceneTest(unittest.TestCase):
             self.assertTrue(requests)
             service.shutdown()
         finally:
+            bridge.stop()
             node.stop()
             world.stop()
+
+    def test_7_a_malformed_scene_is_told_once_and_loses_nothing(self):
+        self.noetic.send(self.noetic.box("part", (0, 0.35, 0)), is_diff=False)
+        self.distance(0.15, "the part", "noetic")
+        Malformed = type("Malformed", (rospy.AnyMsg,), {})
+        Malformed._type, Malformed._md5sum = self.noetic.Scene._type, self.noetic.Scene._md5sum
+        Malformed._full_text = self.noetic.Scene._full_text
+        publisher = rospy.Publisher("/scenes/monitored_planning_scene", Malformed, queue_size=30)
+        lines = len(self.bridges[0].errors())
+        for size in range(20):
+            message = Malformed()
+            message._buff = b"\xff" * size
+            publisher.publish(message)
+        told = self.node.wait_for_status(ProximityArray.NO_CLOUD, "no planning scene that can be read")
+        self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "a full scene")
+        self.noetic.send(is_diff=False)
+        self.at_post()
+        self.assertLessEqual(len(self.bridges[0].errors()), lines + 1)
+        publisher.unregister()
+
+    def test_8_objects_stay_when_the_bridge_has_ended(self):
+        self.noetic.send(self.noetic.box("part", (0, 0.35, 0)), is_diff=False)
+        self.distance(0.15, "the part", "noetic")
+        self.bridges[0].kill()
+        told = self.node.wait_for_status(ProximityArray.DEGRADED, "planning_scene_bridge")
+        ball = pt.link(told, "ball_link")
+        self.assertAlmostEqual(ball.distance, 0.15, 6)
+        self.assertEqual(ball.source, "noetic")
+        # The next one begins with what is latched.
+        self.bridges[0] = Bridge("/scenes", "monitored_planning_scene", "objects")
+        self.distance(0.15, "the part, from the next bridge", "noetic")
+        self.noetic.send(is_diff=False)
+        self.at_post()
 
 
 if __name__ == "__main__":

@@ -84,25 +84,20 @@ TEST(SourceParameters, TheSearchDistanceIsThatOfTheQueries) {
   EXPECT_EQ(parse_parameters(tree, &warnings).sources.at(0).ingest.search_distance, 2.5);
 }
 
-TEST(WorldParameters, APlanningSceneIsATopicOfAnotherType) {
+TEST(WorldParameters, ATopicHasATimeoutAndALargestOctomap) {
   XmlRpcValue tree = good();
   XmlRpcValue& cell = tree["sources"]["cell"];
-  cell["planning_scene"] = "move_group/monitored_planning_scene";
-  cell["planning_scene_service"] = "move_group/get_planning_scene";
-  cell["starts_empty"] = true;
-  cell["use_allowed_collisions"] = false;
+  cell["topic"] = "parts";
   cell["timeout"] = 2.0;
+  cell["max_leaves"] = 1000;
   std::vector<std::string> warnings;
   const ServerConfig config = parse_parameters(tree, &warnings);
   EXPECT_TRUE(warnings.empty()) << warnings.front();
   const SourceConfig& source = config.sources.at(0);
-  EXPECT_EQ(source.topic, "move_group/monitored_planning_scene");
+  EXPECT_EQ(source.topic, "parts");
   EXPECT_TRUE(source.world.has_topic);
-  EXPECT_EQ(source.world.scene_service, "move_group/get_planning_scene");
-  EXPECT_TRUE(source.world.starts_empty);
-  EXPECT_FALSE(source.world.use_allowed_collisions);
   EXPECT_EQ(source.timeout, 2.0);
-  EXPECT_STREQ(message_type(source), "moveit_msgs/PlanningScene");
+  EXPECT_EQ(source.map.max_leaves, 1000U);
 }
 
 std::string error_of(const std::function<void(XmlRpcValue*)>& change) {
@@ -151,13 +146,6 @@ TEST(WorldParameters, MistakesAreNamed) {
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["max_objects"] = 0; }), "max_objects");
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["max_objects"] = 1; }),
                "~sources/cell/objects holds 2 objects: allowed are 1");
-  EXPECT_PRED2(has, error_of([](auto* cell) {
-                 (*cell)["topic"] = "parts";
-                 (*cell)["planning_scene"] = "scene";
-               }),
-               "planning_scene are both set");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["planning_scene"] = ""; }),
-               "planning_scene is empty");
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["file"] = "cell.scene"; }),
                "an absolute path is needed");
   EXPECT_PRED2(has, error_of([](auto* cell) {
@@ -165,7 +153,7 @@ TEST(WorldParameters, MistakesAreNamed) {
                  empty["type"] = "world";
                  *cell = empty;
                }),
-               "at least one of objects, file, topic, planning_scene or robot is needed");
+               "at least one of objects, file, topic or robot is needed");
 }
 
 // A message that cannot be used is told once, however often it comes; others are told until there

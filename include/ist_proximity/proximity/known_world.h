@@ -6,7 +6,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -101,15 +100,10 @@ class WorldBuilder {
                    const Eigen::Isometry3d& X_BO);
   /// @returns false when there is no such object
   bool remove(const std::string& name);
-  /// Sets the links that may touch an object.
-  /// @returns false when there is no such object
-  bool set_allowed_links(const std::string& name, std::vector<std::string> links);
   void clear();                                         ///< removes all objects
   std::size_t size() const { return entries_.size(); }  ///< objects
   /// Whether there is an object of this name.
   bool contains(const std::string& name) const { return entries_.count(name) > 0; }
-  /// The description of an object, as it was added and moved; none: there is no such object.
-  std::optional<WorldObject> object(const std::string& name) const;
 
   /// The world of the objects of now.
   std::shared_ptr<const KnownWorld> world() const;

@@ -22,7 +22,7 @@ SourceReport report_of(const SourceConfig& config, const std::string& place) {
   report.name = config.name;
   report.is_file = is_world ? !config.world.has_topic : !config.file.empty();
   report.topic = place;
-  report.type = message_type(config);
+  report.type = message_type(config.type);
   report.noun = noun(config.type);
   report.timeout = config.timeout;
   report.timeout_parameter = config.timeout_parameter;
@@ -44,7 +44,7 @@ Source::Source(const SourceConfig& config, const ros::NodeHandle& nh, const Tran
     : config_(config),
       buffer_(buffer),
       is_placed_when_asked_(config.type == SourceType::kMap || config.type == SourceType::kWorld),
-      topic_advice_(nh.resolveName(config.topic), message_type(config), own),
+      topic_advice_(nh.resolveName(config.topic), message_type(config.type), own),
       report_(report_of(config, place_of(config, nh))) {}
 
 void Source::start() {
@@ -87,7 +87,7 @@ const SourceSnapshot* Source::newest(const SnapshotRequest& request) {
   std::string doubt = doubt_of_place(*snapshot);
   const std::lock_guard<std::mutex> lock(mutex_);
   placing_problem_ = std::move(problem);
-  report_.doubt_of_place = std::move(doubt);
+  report_.doubt_of_place = doubt.empty() ? report_.doubt_of_sender : std::move(doubt);
   if (!placing_problem_.empty()) return nullptr;
   return is_placed_when_asked_ ? &placed_ : snapshot.get();
 }

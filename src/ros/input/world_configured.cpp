@@ -119,7 +119,6 @@ void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objec
     }
     complete.push_back(object);
     complete.back().frame = frame_or_fixed(object.frame);
-    to_restate_.erase(object.name);
     faults_.erase(object_fault(object.name));
     const std::vector<std::string> links = configured_contacts(object.name);
     std::vector<std::string>& allowed = complete.back().allowed_links;

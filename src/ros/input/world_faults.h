@@ -11,14 +11,14 @@ namespace ist {
 
 /// The subject of a fault of a known world. The first ones are shown first.
 enum class WorldFaultKind {
-  kScene,       ///< no full planning scene has come: until one comes
+  kScene,       ///< the scene that the sender mirrors is not known: until it is
   kConfigured,  ///< parameters and the file: for good, because they are never sent again
   kMessage,     ///< the last message: until the next one
-  kOctomap,     ///< the octomap of a scene: until a scene says anything of it
+  kOctomap,     ///< the octomap: until the next one
   kRobot,       ///< the other robot: until it is read
   kWork,        ///< the source's thread: until it succeeds
   kMany,        ///< more faults than are kept: until all objects are replaced
-  kClash,       ///< a scene's object with the name of a configured one
+  kClash,       ///< a mirror's object with the name of a configured one
   kObject       ///< an object
 };
 

@@ -23,7 +23,9 @@ void WorldSource::receive(const ist_proximity::WorldObjects& message) {
   if (!running_) return;  // up to a thousand wait
   has_received_ = true;
   begin_work();
+  is_mirror_ = message.mirror;
   guard(Kind::kMessage, [&] { apply(message); });
+  if (is_mirror_) guard(Kind::kMessage, [&] { take_from_mirror(message); });
   end_work();
   note_receipt(message.header.stamp);
 }
@@ -57,16 +59,15 @@ void WorldSource::apply(const ist_proximity::WorldObjects& message) {
 void WorldSource::replace_from_topic(const std::function<void()>& change) {
   WorldBuilder builder = builder_;
   std::set<std::string> from_topic = from_topic_;
-  AttachedObjects attached = attached_;
-  std::map<std::string, std::string> to_restate = to_restate_;
   WorldFaults faults = faults_;
   for (const std::string& name : from_topic_) {
     builder_.remove(name);
-    to_restate_.erase(name);
     faults_.erase(object_fault(name));
   }
   from_topic_.clear();
   faults_.erase(fault_of(Kind::kMany));
+  faults_.erase(faults_.lower_bound(fault_of(Kind::kClash)),
+                faults_.lower_bound(fault_of(Kind::kObject)));
   is_changed_ = true;
   change();
   const auto refused = faults_.find(fault_of(Kind::kMessage));
@@ -75,10 +76,24 @@ void WorldSource::replace_from_topic(const std::function<void()>& change) {
   faults[fault_of(Kind::kMessage)] = refused->second;
   builder_ = std::move(builder);
   from_topic_ = std::move(from_topic);
-  attached_ = std::move(attached);
-  to_restate_ = std::move(to_restate);
   faults_ = std::move(faults);
   show_faults();
+}
+
+void WorldSource::change_all(const std::vector<ist_proximity::WorldObject>& objects) {
+  std::vector<WorldObject> added;
+  for (const ist_proximity::WorldObject& object : objects) {
+    try {
+      change(object, &added);
+    } catch (const ModelError& error) {
+      // An older description that the message holds must not end the fault of this one.
+      add(Kind::kMessage, std::exchange(added, {}));
+      const bool is_clash = is_mirror_ && configured_.count(object.id) > 0;
+      note_fault({is_clash ? Kind::kClash : Kind::kObject, object.id},
+                 "object '" + printable(object.id) + "': " + error.what());
+    }
+  }
+  add(Kind::kMessage, added);
 }
 
 /// Applies what a message says of one object; objects to add are collected, because many are built
@@ -86,6 +101,12 @@ void WorldSource::replace_from_topic(const std::function<void()>& change) {
 void WorldSource::change(const ist_proximity::WorldObject& message,
                          std::vector<WorldObject>* added) {
   using Message = ist_proximity::WorldObject;
+  if (is_mirror_ && configured_.count(message.id) > 0 && message.operation != Message::REMOVE) {
+    throw ModelError(
+        "it comes on the topic, and parameters, the file or the other robot state it as well; "
+        "names must be unique in a source");
+  }
+  if (message.operation == Message::APPEND) return append(message, added);
   if (message.operation == Message::ADD) {
     remember_from_topic(message.id);
     added->push_back(to_world_object(message, config_.world, cancelled_));
@@ -97,6 +118,9 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
   }
   is_changed_ = true;
   if (message.operation == Message::REMOVE) {
+    faults_.erase({Kind::kClash, message.id});
+    // A mirror means its own object, of which there is none.
+    if (is_mirror_ && configured_.count(message.id) > 0) return;
     builder_.remove(message.id);
     from_topic_.erase(message.id);
     faults_.erase(object_fault(message.id));
@@ -107,7 +131,7 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
     faults_.erase(object_fault(message.id));
   } else {
     throw ModelError("operation is " + std::to_string(message.operation) +
-                     "; allowed is 0 (ADD), 1 (REMOVE), 2 (MOVE)");
+                     "; allowed is 0 (ADD), 1 (REMOVE), 2 (MOVE), 3 (APPEND)");
   }
 }
 

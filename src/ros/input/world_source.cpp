@@ -24,36 +24,19 @@ constexpr std::uint32_t kQueueSize = 1000;
 WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
                          const TransformBuffer& buffer)
     : Source(config, nh, buffer, ""),
-      builder_(config.world.limits),
-      has_full_scene_(config.world.starts_empty),
-      attached_(config.world.limits.max_objects) {
+      builder_(config.world.limits) {
   if (!config.world.robot.description.empty()) {
     robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, nh);
     is_robot_read_ = false;
     update([](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
   }
   markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("world/" + config.name, 1, true);
-  if (config.world.is_planning_scene && !config.world.scene_service.empty()) {
-    scene_request_ = std::make_unique<SceneRequest>(nh.resolveName(config.world.scene_service));
-  }
   nh.setCallbackQueue(&queue_);
-  if (config.world.has_topic) subscribe(&nh);
-  start();
-}
-
-void WorldSource::subscribe(ros::NodeHandle* nh) {
-  const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
-  if (!config_.world.is_planning_scene) {
-    subscribers_ = {nh->subscribe(config_.topic, kQueueSize, &WorldSource::receive, this, hints)};
-    return;
+  if (config.world.has_topic) {
+    subscribers_ = {nh.subscribe(config.topic, kQueueSize, &WorldSource::receive, this,
+                                 ros::TransportHints().tcpNoDelay())};
   }
-  ros::SubscribeOptions options;
-  using Event = ros::MessageEvent<const topic_tools::ShapeShifter>;
-  options.initByFullCallbackType<const Event&>(
-      config_.topic, kQueueSize, [this](const Event& event) { receive_scene(event); });
-  options.datatype = kPlanningSceneType;  // of any md5sum
-  options.transport_hints = hints;
-  subscribers_ = {nh->subscribe(options)};
+  start();
 }
 
 /// Places the links of the other robot, and what stands still in the fixed frame.
@@ -76,18 +59,12 @@ void WorldSource::run() {
   guard(Kind::kConfigured, [this] { read_configured(); });
   is_changed_ = true;
   while (running_) {
-    if (scene_request_ && scene_request_->is_pending()) {
-      kPoll.sleep();  // differences change the scene that is asked for, so they wait for it
-    } else {
-      guard(Kind::kMessage, [this] { queue_.callAvailable(kPoll); });
-    }
-    if (scene_request_) guard(Kind::kMessage, [this] { receive_answer(); });
+    guard(Kind::kMessage, [this] { queue_.callAvailable(kPoll); });
     guard(Kind::kWork, [this] {
       if (!is_robot_read_) read_robot();
       const std::optional<std::uint32_t> publishers = count_publishers();
-      if (publishers && config_.world.is_planning_scene) note_publishers(*publishers);
+      if (publishers && is_mirror_) note_publishers(*publishers);
       take_target();
-      restate_waiting();
       if (is_changed_ && target_.model) publish();
       free_unused();
       if (faults_.erase(fault_of(Kind::kWork)) > 0) show_faults();

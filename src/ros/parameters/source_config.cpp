@@ -15,10 +15,6 @@ constexpr const char* kNouns[] = {"cloud", "image", "scan", "map", "world"};
 
 const char* message_type(SourceType type) { return kMessages[static_cast<int>(type)]; }
 
-const char* message_type(const SourceConfig& config) {
-  return config.world.is_planning_scene ? kPlanningSceneType : message_type(config.type);
-}
-
 const char* noun(SourceType type) { return kNouns[static_cast<int>(type)]; }
 
 bool SourceConfig::is_permanent() const {

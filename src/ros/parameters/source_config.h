@@ -22,9 +22,6 @@ enum class SourceType { kCloud, kDepthImage, kScan, kMap, kWorld };
 /// The ROS message type of a source, as rostopic writes it; a known world's type in ~sources is
 /// "world".
 const char* message_type(SourceType type);
-/// The same for what comes on the topic of a source.
-struct SourceConfig;
-const char* message_type(const SourceConfig& config);
 /// The word for one message of a source: "cloud", "image", "scan", "map" or "world".
 const char* noun(SourceType type);
 
@@ -39,9 +36,6 @@ struct SourceMemoryConfig {
 /// Depth cameras have 10 to 60 % of pixels without a measurement, and lidars up to 85 %, where they
 /// look at the sky. What sees less than a tenth does not see the view that it stands for.
 constexpr double kMinMeasured = 0.1;
-
-/// The message type that a known world has on `planning_scene`.
-constexpr const char* kPlanningSceneType = "moveit_msgs/PlanningScene";
 
 /// An object of ~sources/NAME/objects.
 struct WorldObjectConfig {
@@ -62,14 +56,7 @@ struct WorldConfig {
   std::string frame_id;  ///< of objects that state none; empty: the fixed frame
   std::vector<WorldObjectConfig> objects;
   OtherRobotConfig robot;
-  bool has_topic = false;          ///< whether its topic is subscribed to
-  bool is_planning_scene = false;  ///< whether that is a moveit_msgs/PlanningScene
-  /// Service that is asked for the full scene while none has come; empty: none.
-  std::string scene_service = "get_planning_scene";
-  /// Whether planning scenes that are differences begin with an empty world.
-  bool starts_empty = false;
-  /// Whether pairs of the allowed collision matrix of planning scenes may touch.
-  bool use_allowed_collisions = true;
+  bool has_topic = false;  ///< whether its topic is subscribed to
   WorldLimits limits;
   double margin = 0.0;                         ///< [m] of objects that state none
   std::map<std::string, double> link_margins;  ///< [m] by name of a link

@@ -130,35 +130,6 @@ void read_robot(ParameterReader* reader, const std::string& at, OtherRobotConfig
   }
 }
 
-// Changes of the world come on one topic, of the one type or of the other.
-void read_topic(ParameterReader* reader, const std::string& at, SourceConfig* source) {
-  WorldConfig& world = source->world;
-  world.has_topic = reader->has(at + "topic");
-  world.is_planning_scene = reader->has(at + "planning_scene");
-  source->timeout = kInf;  // objects are sent when they change
-  if (world.is_planning_scene) {
-    if (world.has_topic) {
-      reader->add_error(at + "topic", "and ~" + at +
-                                          "planning_scene are both set: a source has one of them; "
-                                          "give the other one a source of its own");
-    }
-    world.has_topic = true;
-    reader->read_all({{at + "planning_scene", &source->topic},
-                      {at + "planning_scene_service", &world.scene_service},
-                      {at + "starts_empty", &world.starts_empty},
-                      {at + "use_allowed_collisions", &world.use_allowed_collisions},
-                      {at + "max_leaves", &source->map.max_leaves, {"", 1.0, 5e7}}});
-    if (source->topic.empty()) {
-      reader->add_error(at + "planning_scene",
-                        "is empty: the name of a topic is needed, for example "
-                        "/move_group/monitored_planning_scene");
-    }
-  }
-  if (world.has_topic) {
-    reader->read({at + "timeout", &source->timeout, Range::positive("s", kInf, true)});
-  }
-}
-
 }  // namespace
 
 void read_world(ParameterReader* reader, const std::string& at, SourceConfig* source) {
@@ -177,12 +148,16 @@ void read_world(ParameterReader* reader, const std::string& at, SourceConfig* so
   read_robot(reader, at + "robot", &world.robot);
   if (reader->has(at + "file"))
     read_path(reader, at + "file", "/home/robot/cell.scene", &source->file);
-  read_topic(reader, at, source);
+  world.has_topic = reader->has(at + "topic");
+  source->timeout = kInf;  // objects are sent when they change
+  if (world.has_topic) {
+    reader->read_all({{at + "timeout", &source->timeout, Range::positive("s", kInf, true)},
+                      {at + "max_leaves", &source->map.max_leaves, {"", 1.0, 5e7}}});
+  }
   if (!world.has_topic && source->file.empty() && !reader->has(at + "objects") &&
       world.robot.description.empty()) {
     reader->add_error(at + "type",
-                      "is world: at least one of objects, file, topic, planning_scene or robot is "
-                      "needed");
+                      "is world: at least one of objects, file, topic or robot is needed");
   }
 }
 
