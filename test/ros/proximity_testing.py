@@ -497,3 +497,7 @@ def check_invariants(test, message, max_distance=1.0):
         test.assertFalse(all_unknown(message) and message.links)
     else:
         test.assertNotEqual(message.status_text, "")
+    if message.status in (ProximityArray.NO_CLOUD, ProximityArray.STALE_CLOUD):
+        test.assertTrue(all_unknown(message))
+    fresh = [s.name for s in message.sources if s.status == ProximityArray.OK and not s.name.endswith("/memory")]
+    test.assertTrue(fresh or not message.sources or all_unknown(message), "nobody vouches for what is free")

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "ros/common/memory.h"
-#include "ros/output/message_invariants.h"
 
 namespace ist {
 
@@ -183,7 +182,6 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     ProximityArray& result = response->results.back();
     cycle_->forget();  // the configurations are no motion, so there is no speed between them
     cycle_->run(ros::Time::now(), sources_, live, "", &result);
-    assert_invariants(result, {ros::Time::now(), least_when_clear(config_), live.query.margin});
     if (request.self_proximity != 0) self_.add(*poses_, live.query, &response->pairs);
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));

@@ -14,7 +14,6 @@
 #include "ros/common/thread_name.h"
 #include "ros/cycle/cycle_message.h"
 #include "ros/output/message_conversion.h"
-#include "ros/output/message_invariants.h"
 #include "ros/poses/joint_pose_source.h"
 #include "ros/services/pair_choice.h"
 
@@ -237,7 +236,6 @@ void SelfProximity::publish_once() {
   const Status status = overall_status(input, now.toSec());
   message->status = status.code;
   message->status_text = status.text;
-  assert_invariants(*message, {ros::Time::now(), config_.query.max_distance, live.query.margin});
   publish(message);
 }
 
