@@ -74,10 +74,10 @@ TEST(CycleDeadline, UsualPeriodFollowsARateThatChanges) {
 TEST(CycleDeadline, StatusSaysWhatItCost) {
   using ist_proximity::ProximityArray;
   StatusInput input;
-  EXPECT_EQ(overall_status(input, 0.0).code, ProximityArray::OK);
+  EXPECT_EQ(decide(find_all(input, 0.0), true).code, ProximityArray::OK);
   input.deadline.unfinished = 3;
   input.deadline.widest = 0.0123;
-  Status status = overall_status(input, 0.0);
+  Status status = decide(find_all(input, 0.0), true);
   EXPECT_EQ(status.code, ProximityArray::DEGRADED);
   EXPECT_NE(status.text.find("~query/deadline passed before 3 links met ~query/tolerance"),
             std::string::npos)
@@ -86,7 +86,7 @@ TEST(CycleDeadline, StatusSaysWhatItCost) {
 
   input.deadline = DeadlineCost();
   input.deadline.unblended = 1;
-  status = overall_status(input, 0.0);
+  status = decide(find_all(input, 0.0), true);
   EXPECT_EQ(status.code, ProximityArray::DEGRADED);
   EXPECT_NE(status.text.find("the repulsion of 1 link was blended"), std::string::npos)
       << status.text;
@@ -94,7 +94,7 @@ TEST(CycleDeadline, StatusSaysWhatItCost) {
   input.deadline = DeadlineCost();
   input.deadline.no_penetration = 2;
   input.deadline.least_known = 0.4;
-  status = overall_status(input, 0.0);
+  status = decide(find_all(input, 0.0), true);
   EXPECT_EQ(status.code, ProximityArray::DEGRADED);
   EXPECT_NE(status.text.find("the contact volume of 2 links"), std::string::npos) << status.text;
   EXPECT_NE(status.text.find("40 %"), std::string::npos) << status.text;

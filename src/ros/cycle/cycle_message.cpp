@@ -24,40 +24,8 @@ std::string older_than_cloud(const StampedLinkPoses& poses, const PoseSource* so
          (source ? ": " + source->hint() : "");
 }
 
-}  // namespace
-
-void fill_status(const StatusInput& input, const Status& status, ProximityArray* message) {
-  message->sources.resize(input.sources.size());
-  for (std::size_t i = 0; i < input.sources.size(); ++i) {
-    assign_source(input.sources[i], input.source_statuses[i], message->header.stamp,
-                  &message->sources[i]);
-  }
-  message->status = status.code;
-  message->status_text = status.text;
-}
-
-void fill_without_model(const ModelState& model, const ServerConfig& config, const ros::Time& now,
-                        const CloudSources& sources, ProximityArray* message, CycleReport* report) {
-  StatusInput input;
-  input.model_problem = model.problem;
-  input.is_loading = model.is_loading();
-  input.clock_runs = !now.isZero();
-  for (const auto& source : sources) {
-    input.sources.emplace_back();
-    source->report(&input.sources.back());
-    input.source_statuses.push_back(source_status(input.sources.back(), now.toSec()));
-  }
-  *message = ProximityArray();
-  message->header.stamp = now;
-  message->header.frame_id = fixed_frame_of(model, config);
-  for (const std::string& link : model.links) message->links.push_back(unknown_link(link));
-  const Status status = overall_status(input, now.toSec());
-  fill_status(input, status, message);
-  report->take(input, status);
-  report->links_monitored = model.links.size();
-  report->links_known = 0;
-}
-
+/// Describes the links whose geometry cannot be used: a sentence each, or where there are many the
+/// first ones' and one that names the others. A link that is pending is none of them.
 std::vector<std::string> faulty_links(const RobotModel& robot,
                                       const std::vector<std::size_t>& monitored) {
   constexpr std::size_t kFew = 6, kTold = 3;
@@ -74,6 +42,50 @@ std::vector<std::string> faulty_links(const RobotModel& robot,
   reasons.push_back("nor can the geometry of " + join(names, ", ") +
                     " be used: the diagnostics of the model give the reasons");
   return reasons;
+}
+
+}  // namespace
+
+void fill_status(const StatusInput& input, const Status& status, ProximityArray* message) {
+  message->sources.resize(input.sources.size());
+  for (std::size_t i = 0; i < input.sources.size(); ++i) {
+    assign_source(input.sources[i], input.source_statuses[i], message->header.stamp,
+                  &message->sources[i]);
+  }
+  message->status = status.code;
+  message->status_text = status.text;
+}
+
+void fill_without_model(const ModelState& model, const ServerConfig& config, const ros::Time& now,
+                        const CloudSources& sources, ProximityArray* message, CycleReport* report) {
+  StatusInput input;
+  input.findings = model_findings(model);
+  input.has_model = model.problem.empty();
+  input.clock_runs = !now.isZero();
+  for (const auto& source : sources) {
+    input.sources.emplace_back();
+    source->report(&input.sources.back());
+    input.source_statuses.push_back(source_status(input.sources.back(), now.toSec()));
+  }
+  *message = ProximityArray();
+  message->header.stamp = now;
+  message->header.frame_id = fixed_frame_of(model, config);
+  for (const std::string& link : model.links) message->links.push_back(unknown_link(link));
+  const Findings findings = find_all(input, now.toSec());
+  const Status status = decide(findings, input.clock_runs);
+  fill_status(input, status, message);
+  report->take(input, findings, status);
+  report->links_monitored = model.links.size();
+  report->links_known = 0;
+}
+
+Findings model_findings(const ModelState& model) {
+  Findings findings;
+  note(model.is_loading() ? Rank::kLoading : Rank::kModel, "model", model.problem, &findings);
+  if (model.robot) {
+    note(Rank::kModel, "model", faulty_links(*model.robot, model.monitored), &findings);
+  }
+  return findings;
 }
 
 std::vector<std::string> missing_poses(const RobotModel& robot,

@@ -20,17 +20,14 @@ namespace ist {
 void fill_status(const StatusInput& input, const Status& status,
                  ist_proximity::ProximityArray* message);
 
+/// What is found of a model whose robot is known, or not yet.
+Findings model_findings(const ModelState& model);
+
 /// Fills the whole message while there is no model: MODEL_ERROR or LOADING, and every
 /// link UNKNOWN.
 void fill_without_model(const ModelState& model, const ServerConfig& config, const ros::Time& now,
                         const CloudSources& sources, ist_proximity::ProximityArray* message,
                         CycleReport* report);
-
-/// Describes the links whose geometry cannot be used: a sentence each, or where there are many the
-/// first ones' and one that names the others. Empty when there are none. A link that is pending is
-/// none of them.
-std::vector<std::string> faulty_links(const RobotModel& robot,
-                                      const std::vector<std::size_t>& monitored);
 
 /// Describes the links without a pose: one sentence with the first link's reason and the source's
 /// hint, and one that names the others. Empty when all monitored links have poses.

@@ -22,6 +22,11 @@ namespace {
 constexpr double kUnknownShare = 0.2;
 constexpr double kLeastDeadline = 1e-9;  // [s] 0 would be none
 
+constexpr char kOutsideRegion[] =
+    "a link is farther out than the limits of prismatic joints allow and is near places where "
+    "points were dropped as outside the region of interest: obstacles there are not known; state "
+    "the true limits in the URDF";
+
 }  // namespace
 
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
@@ -53,7 +58,6 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
       wrenches_(robot_.links.size(), Wrench::unknown()) {
   set_problem(*model_);
-  status_input_.link_errors = faulty_links(robot_, model_->monitored);
 }
 
 void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
@@ -66,6 +70,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   message->poses_time = watch.lap();
   const TimePoint begin = Stopwatch::Clock::now();
   status_input_.deadline = DeadlineCost();
+  status_input_.findings = model_findings_;
   asked_.request = {model_->robot, poses_.stamp, pose_timeout_};
   selection_.update(now, sources, asked_.request, &status_input_);
   take_warm_queries();
@@ -87,7 +92,8 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   message->cloud_stamp = selection_.oldest_stamp();
   message->unfinished = static_cast<std::uint32_t>(status_input_.deadline.unfinished);
   fill_links(message);
-  status_ = overall_status(status_input_, now.toSec());
+  findings_ = find_all(status_input_, now.toSec());
+  status_ = decide(findings_, status_input_.clock_runs);
   fill_status(status_input_, status_, message);
   message->message_time = preparation + watch.lap();
   message->computation_time = message->query_time + message->repulsion_time +
@@ -95,7 +101,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
 }
 
 void ProximityCycle::report(const ProximityArray& message, CycleReport* report) const {
-  report->take(status_input_, status_);
+  report->take(status_input_, findings_, status_);
   report->links_monitored = model_->monitored.size();
   report->links_known = poses_.count_known();
   report->pose_age = seconds_between(poses_.stamp, now_);
@@ -108,8 +114,8 @@ void ProximityCycle::report(const ProximityArray& message, CycleReport* report) 
 }
 
 void ProximityCycle::set_problem(const ModelState& model) {
-  status_input_.model_problem = model.problem;
-  status_input_.is_loading = model.is_loading();
+  status_input_.has_model = model.problem.empty();
+  model_findings_ = model_findings(model);
 }
 
 void ProximityCycle::set_warm_up(SceneWarmUp* warm_up) {
@@ -168,13 +174,14 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   clouds.set_config(query);
   clouds.run(poses_.X_FL, known_, selection_.clouds(), &results_);
   const QueryStatistics& statistics = clouds.statistics();
-  status_input_.outside_region = statistics.outside_region > 0;
+  if (statistics.outside_region > 0) {
+    note(Rank::kDegraded, "query", kOutsideRegion, &status_input_.findings);
+  }
   status_input_.deadline.unfinished += statistics.unfinished;
   status_input_.deadline.widest = std::max(status_input_.deadline.widest, statistics.widest);
   late_maps_.lower(max_distance, &results_);
   for (const LateFrames* late : {&late_worlds_, &late_maps_}) {
-    const std::string doubt = late->doubt(query.tolerance);
-    if (!doubt.empty()) status_input_.pose_doubts.push_back(doubt);
+    note(Rank::kDegraded, "pose", late->doubt(query.tolerance), &status_input_.findings);
   }
   cloud_results_ = results_;
   worlds_.combine(selection_.clouds(), &results_);
@@ -213,8 +220,10 @@ void ProximityCycle::ask_unknown_space(const LiveConfig& config) {
   if (!unknown_space_) return;
   QueryConfig query = config.query;
   query.deadline *= kUnknownShare;
-  status_input_.unknown_space_problem = unknown_space_->run(
-      poses_, known_, fixed_frame_, pose_timeout_, query, config.repulsion.influence_distance);
+  note(Rank::kDegraded, "query",
+       unknown_space_->run(poses_, known_, fixed_frame_, pose_timeout_, query,
+                           config.repulsion.influence_distance),
+       &status_input_.findings);
 }
 
 /// The links that matter most are served first, as time may end.
@@ -267,8 +276,8 @@ void ProximityCycle::look_up_poses(const ros::Time& now) {
 }
 
 void ProximityCycle::describe_pose_problems(const std::string& transform_problem) {
-  std::vector<std::string>& problems = status_input_.pose_problems;
-  problems = missing_poses(robot_, model_->monitored, poses_, pose_source_.get());
+  std::vector<std::string> problems =
+      missing_poses(robot_, model_->monitored, poses_, pose_source_.get());
   for (std::size_t i = 0; i < selection_.selected().size(); ++i) {
     const SourceSnapshot* snapshot = selection_.selected()[i];
     if (!snapshot) continue;
@@ -277,11 +286,12 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
                          status_input_.sources[i].name);
     if (!unfiltered.empty()) problems.push_back(unfiltered);
   }
-  status_input_.pose_doubts = poses_.doubts;
   const bool is_new = std::none_of(problems.begin(), problems.end(), [&](const std::string& text) {
     return text.find(transform_problem) != std::string::npos;
   });
   if (!problems.empty() && is_new) problems.push_back(transform_problem);
+  note(Rank::kPose, "pose", problems, &status_input_.findings);
+  note(Rank::kDegraded, "pose", poses_.doubts, &status_input_.findings);
 }
 
 void ProximityCycle::fill_links(ProximityArray* message) {

@@ -153,6 +153,7 @@ class ProximityCycle {
   StampedLinkPoses poses_;
   LateFrames late_worlds_, late_maps_;
   StatusInput status_input_;
+  Findings model_findings_, findings_;        ///< the former for all cycles
   std::vector<LinkProximity> results_;        ///< by link of the robot: clouds and worlds
   std::vector<LinkProximity> cloud_results_;  ///< the same of clouds alone
   std::vector<RepulsiveWrench> pushes_;       ///< by link of the robot, filtered

@@ -205,9 +205,10 @@ void SelfProximity::publish_once() {
   live.query.deadline = deadline_of(live.query.deadline, 1.0 / config_.self_collision.rate);
   StatusInput input;
   input.clock_runs = !now.isZero();
-  input.model_problem =
-      model_->problem.empty() && !model_->kinematics ? no_kinematics(*model_) : model_->problem;
-  input.is_loading = model_->is_loading();
+  input.findings = model_findings(*model_);
+  if (model_->problem.empty() && !model_->kinematics) {
+    note(Rank::kModel, "model", no_kinematics(*model_), &input.findings);
+  }
   message->header.frame_id = fixed_frame_of(*model_, config_);
   message->header.stamp = std::max(now, last_stamp_);
   if (query_) {
@@ -223,8 +224,8 @@ void SelfProximity::publish_once() {
     compute_wrenches(live, end_of(live.query.deadline, 1.0, begin), &input.deadline);
     message->header.stamp = poses_.stamp;
     const RobotModel& robot = *model_->robot;
-    input.link_errors = faulty_links(robot, model_->monitored);
-    input.pose_problems = missing_poses(robot, model_->monitored, poses_, pose_source_.get());
+    note(Rank::kPose, "pose", missing_poses(robot, model_->monitored, poses_, pose_source_.get()),
+         &input.findings);
     for (const std::size_t i : model_->monitored) add_link(i, live.repulsion, message.get());
     const std::chrono::duration<double> took = Clock::now() - begin;
     message->computation_time = took.count();
@@ -232,8 +233,8 @@ void SelfProximity::publish_once() {
     for (const std::string& link : model_->links) message->links.push_back(unknown_link(link));
   }
   last_stamp_ = message->header.stamp;
-  input.pose_doubts = poses_.doubts;
-  const Status status = overall_status(input, now.toSec());
+  note(Rank::kDegraded, "pose", poses_.doubts, &input.findings);
+  const Status status = decide(find_all(input, now.toSec()), input.clock_runs);
   message->status = status.code;
   message->status_text = status.text;
   publish(message);

@@ -22,11 +22,11 @@ double CycleTimes::quantile(double q) const {
   return sorted[std::min(rank, sorted.size() - 1)];
 }
 
-void CycleReport::take(const StatusInput& input, const Status& decided) {
+void CycleReport::take(const StatusInput& input, const Findings& found, const Status& decided) {
   status = decided;
   sources = input.sources;
   source_statuses = input.source_statuses;
-  pose_problems = input.pose_problems;
+  findings = found;
 }
 
 void CycleReport::add_times(const ist_proximity::ProximityArray& message) {

@@ -42,9 +42,9 @@ enum CyclePart : std::size_t {
 /// Results of the last cycle, for the diagnostics thread.
 struct CycleReport {
   Status status{0, ""};
+  Findings findings;  ///< of the last cycle, and what the diagnostics add
   std::vector<SourceReport> sources;
-  std::vector<Status> source_statuses;  ///< by source
-  std::vector<std::string> pose_problems;
+  std::vector<Status> source_statuses;           ///< by source
   std::string parameter_problem;                 ///< LiveParameters::problem()
   std::string parameters_without_effect;         ///< LiveParameters::without_effect()
   std::string transform_problem;                 ///< a transform that the tf listener rejected
@@ -64,8 +64,8 @@ struct CycleReport {
   std::size_t query_memory = 0;      ///< [bytes] of the cycle's query
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
 
-  /// Takes the sources, the problems of poses and the status.
-  void take(const StatusInput& input, const Status& decided);
+  /// Takes the sources, what is found, and the status.
+  void take(const StatusInput& input, const Findings& found, const Status& decided);
   /// Adds the times that a message tells.
   void add_times(const ist_proximity::ProximityArray& message);
 };

@@ -132,12 +132,22 @@ void add_parts(const CycleReport& report, DiagnosticStatus* status) {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-DiagnosticStatus make_diagnostic(const std::string& node, const std::string& what) {
+DiagnosticStatus make_diagnostic(const std::string& node, const std::string& what,
+                                 const Findings& findings) {
   DiagnosticStatus status;
   status.name = node + ": " + what;
   status.hardware_id = node;
   status.level = DiagnosticStatus::OK;
   status.message = "OK";
+  double since = 0.0;
+  for (const Finding& finding : findings) {
+    if (finding.what != what) continue;
+    if (finding.level > static_cast<std::uint8_t>(status.level)) since = finding.since;
+    raise(finding.level, finding.text, &status);
+  }
+  if (status.level > DiagnosticStatus::OK) {
+    add_value("since", format_text("%.0f s", since), &status);
+  }
   return status;
 }
 
@@ -161,51 +171,57 @@ void add_value(const std::string& key, std::size_t value, DiagnosticStatus* stat
 std::string milliseconds(double seconds) { return format_text("%.3f ms", 1e3 * seconds); }
 std::string millimetres(double metres) { return format_text("%.2f mm", 1e3 * metres); }
 
-DiagnosticStatus input_diagnostics(const std::string& node, const SourceReport& source,
-                                   const Status& source_status, double rate, double now) {
-  DiagnosticStatus status = make_diagnostic(node, "input " + source.name);
-  if (source_status.code == ProximityArray::STALE_CLOUD) {
-    raise(source.required ? DiagnosticStatus::STALE : DiagnosticStatus::WARN, source_status.text,
-          &status);
-  } else if (!source_status.ok()) {
-    raise(source.required ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN, source_status.text,
-          &status);
-  } else if (!source.problem.empty()) {
-    raise(DiagnosticStatus::WARN, "the newest " + source.noun + " is not in use: " + source.problem,
-          &status);
+void add_remarks(double rate, double wanted_rate, CycleReport* report) {
+  Findings* findings = &report->findings;
+  for (std::size_t i = 0; i < report->sources.size(); ++i) {
+    const SourceReport& source = report->sources[i];
+    const std::string what = "input " + source.name;
+    if (report->source_statuses[i].ok() && !source.problem.empty()) {
+      note(Rank::kRemark, what, "the newest " + source.noun + " is not in use: " + source.problem,
+           findings);
+    }
+    if (source.ahead >= kToldSkew) {
+      note(Rank::kRemark, what,
+           format_text("its stamps are %.3f s ahead of the clock", source.ahead) +
+               ": its age counts from its receipt; compare the clocks of sensor and node",
+           findings);
+    }
+    for (const std::string& doubt :
+         {source.doubt, doubt_of_self_filter(source), doubt_of_view(source.view)}) {
+      note(Rank::kRemark, what, doubt, findings);
+    }
   }
-  if (source.ahead >= kToldSkew) {
-    raise(DiagnosticStatus::WARN,
-          format_text("its stamps are %.3f s ahead of the clock", source.ahead) +
-              ": its age counts from its receipt; compare the clocks of sensor and node",
-          &status);
+  const std::string wanted = report->joint_states ? "rate of the joint states" : "~rate";
+  if (rate < 0.8 * wanted_rate) {
+    note(Rank::kRemark, "query", "the rate is lower than " + wanted + ": the machine is too busy",
+         findings);
   }
-  if (!source.doubt.empty()) raise(DiagnosticStatus::WARN, source.doubt, &status);
-  const std::string doubt = doubt_of_self_filter(source);
-  if (!doubt.empty()) raise(DiagnosticStatus::WARN, doubt, &status);
-  const std::string drift = doubt_of_view(source.view);
-  if (!drift.empty()) raise(DiagnosticStatus::WARN, drift, &status);
+  note(Rank::kRemark, "query", report->parameter_problem, findings);
+  note(Rank::kRemark, "query", report->parameters_without_effect, findings);
+  note(Rank::kRemark, "query", report->counted_problem, findings);
+  if (report->links_monitored == 0) {
+    note(Rank::kRemark, "pose", std::string("no link is looked up yet"), findings);
+  }
+  note(Rank::kRemark, "pose", report->transform_problem, findings);
+  if (report->joint_states) note(Rank::kRemark, "pose", report->joint_states->problem, findings);
+}
+
+DiagnosticStatus input_diagnostics(const std::string& node, const CycleReport& report,
+                                   std::size_t index, double rate, double now) {
+  const SourceReport& source = report.sources[index];
+  DiagnosticStatus status = make_diagnostic(node, "input " + source.name, report.findings);
   add_source_counts(source, rate, now, &status);
   if (!std::isnan(source.blind_skin)) add_view(source, &status);
   return status;
 }
 
 DiagnosticStatus pose_diagnostics(const std::string& node, const CycleReport& report) {
-  DiagnosticStatus status = make_diagnostic(node, "pose");
-  if (!report.pose_problems.empty()) {
-    raise(DiagnosticStatus::ERROR, report.pose_problems.front(), &status);
-  } else if (report.links_monitored == 0) {
-    raise(DiagnosticStatus::WARN, "no link is looked up yet", &status);
-  }
-  if (!report.transform_problem.empty()) {
-    raise(DiagnosticStatus::WARN, report.transform_problem, &status);
-  }
+  DiagnosticStatus status = make_diagnostic(node, "pose", report.findings);
   add_value("links monitored", report.links_monitored, &status);
   add_value("links with a pose", report.links_known, &status);
   if (report.links_known > 0) add_value("age", format_text("%.3f s", report.pose_age), &status);
   if (report.joint_states) {
     const JointStateReport& joints = *report.joint_states;
-    if (!joints.problem.empty()) raise(DiagnosticStatus::WARN, joints.problem, &status);
     add_value("topic", joints.topic, &status);
     add_value("publishers", joints.publishers, &status);
     add_value("joint states received", joints.messages, &status);
@@ -213,32 +229,21 @@ DiagnosticStatus pose_diagnostics(const std::string& node, const CycleReport& re
     add_value("joint states skipped: more came than can be answered", joints.skipped, &status);
     add_value("positions that cannot be used", joints.dropped, &status);
   }
-  for (const std::string& problem : report.pose_problems) add_value("problem", problem, &status);
+  for (const Finding& finding : report.findings) {
+    if (finding.rank == Rank::kPose) add_value("problem", finding.text, &status);
+  }
   return status;
 }
 
 DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& report, double rate,
                                    double wanted_rate) {
-  DiagnosticStatus status = make_diagnostic(node, "query");
-  if (report.status.code == ProximityArray::DEGRADED) {
-    raise(DiagnosticStatus::WARN, report.status.text, &status);
-  } else if (report.status.code != ProximityArray::OK) {
-    raise(DiagnosticStatus::ERROR, report.status.text, &status);
-  }
+  Findings findings;  // first the status as a whole
+  const bool is_degraded = report.status.code == ProximityArray::DEGRADED;
+  note(is_degraded ? Rank::kDegraded : Rank::kModel, "query", report.status.text, &findings);
+  if (!findings.empty()) findings.front().since = report.findings.front().since;
+  findings.insert(findings.end(), report.findings.begin(), report.findings.end());
+  DiagnosticStatus status = make_diagnostic(node, "query", findings);
   const std::string wanted = report.joint_states ? "rate of the joint states" : "~rate";
-  if (rate < 0.8 * wanted_rate) {
-    raise(DiagnosticStatus::WARN, "the rate is lower than " + wanted + ": the machine is too busy",
-          &status);
-  }
-  if (!report.parameter_problem.empty()) {
-    raise(DiagnosticStatus::WARN, report.parameter_problem, &status);
-  }
-  if (!report.parameters_without_effect.empty()) {
-    raise(DiagnosticStatus::WARN, report.parameters_without_effect, &status);
-  }
-  if (!report.counted_problem.empty()) {
-    raise(DiagnosticStatus::WARN, report.counted_problem, &status);
-  }
   add_value("min_distance",
             std::isnan(report.min_distance) ? "not known" : millimetres(report.min_distance),
             &status);

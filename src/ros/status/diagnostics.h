@@ -14,15 +14,19 @@
 
 namespace ist {
 
-// Pure functions that give one DiagnosticStatus each; `node` begins every name. Other programs read
-// the keys, so they stay as they are.
+/// Adds what no status of a message says.
+/// @param wanted_rate  [Hz] ~rate, or the rate of the joint states
+void add_remarks(double rate, double wanted_rate, CycleReport* report);
 
-/// @param rate  [Hz] of the source's messages since the last call
-/// @param now   [s] ROS clock
+// Pure functions that give one DiagnosticStatus each, of the report's findings and of numbers;
+// `node` begins every name. Other programs read the keys, so they stay as they are.
+
+/// @param index  of the source
+/// @param rate   [Hz] of the source's messages since the last call
+/// @param now    [s] ROS clock
 diagnostic_msgs::DiagnosticStatus input_diagnostics(const std::string& node,
-                                                    const SourceReport& source,
-                                                    const Status& source_status, double rate,
-                                                    double now);
+                                                    const CycleReport& report, std::size_t index,
+                                                    double rate, double now);
 diagnostic_msgs::DiagnosticStatus pose_diagnostics(const std::string& node,
                                                    const CycleReport& report);
 /// @param rate         [Hz] reached since the last call
@@ -38,8 +42,9 @@ diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
 
 // Helpers to fill a DiagnosticStatus.
 
-/// Makes the status OK named "NODE: WHAT".
-diagnostic_msgs::DiagnosticStatus make_diagnostic(const std::string& node, const std::string& what);
+/// Makes the status named "NODE: WHAT", of what is found of it.
+diagnostic_msgs::DiagnosticStatus make_diagnostic(const std::string& node, const std::string& what,
+                                                  const Findings& findings);
 
 /// Raises the level and replaces the message, unless the level is as high already.
 void raise(std::uint8_t level, const std::string& message,

@@ -4,6 +4,8 @@
 #include <ist_proximity/ProximityArray.h>
 #include <ros/console.h>
 
+#include <utility>
+
 #include "ros/common/publish.h"
 #include "ros/status/diagnostics.h"
 
@@ -41,7 +43,20 @@ DiagnosticsPublisher::DiagnosticsPublisher(ros::NodeHandle nh, const std::string
       publisher_(nh.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10)),
       last_time_(std::chrono::steady_clock::now()) {}
 
-void DiagnosticsPublisher::publish(const CycleReport& report, const ModelState& model,
+/// Notes for how long there has been a finding of each kind.
+void DiagnosticsPublisher::note_since(std::chrono::steady_clock::time_point now,
+                                      Findings* findings) {
+  std::map<std::pair<std::string, Rank>, std::chrono::steady_clock::time_point> since;
+  for (Finding& finding : *findings) {
+    const auto known = since_.find({finding.what, finding.rank});
+    const auto begin = known == since_.end() ? now : known->second;
+    since[{finding.what, finding.rank}] = begin;
+    finding.since = std::chrono::duration<double>(now - begin).count();
+  }
+  since_ = std::move(since);
+}
+
+void DiagnosticsPublisher::publish(CycleReport report, const ModelState& model,
                                    const ContactModel* contacts, std::uint64_t triggers) {
   // The loader itself logs its progress until the model is ready.
   if (model.is_ready()) {
@@ -53,20 +68,21 @@ void DiagnosticsPublisher::publish(const CycleReport& report, const ModelState& 
     return static_cast<double>(count - last) / interval.count();
   };
 
+  const double rate = rate_since(report.cycles, last_cycles_);
+  const double wanted_rate = report.joint_states ? rate_since(triggers, last_triggers_) : rate_;
+  add_remarks(rate, wanted_rate, &report);
+  note_since(now, &report.findings);
   diagnostic_msgs::DiagnosticArray message;
   message.header.stamp = ros::Time::now();
   last_messages_.resize(report.sources.size());
   for (std::size_t i = 0; i < report.sources.size(); ++i) {
-    const SourceReport& source = report.sources[i];
-    message.status.push_back(input_diagnostics(node_, source, report.source_statuses[i],
-                                               rate_since(source.messages, last_messages_[i]),
-                                               message.header.stamp.toSec()));
-    last_messages_[i] = source.messages;
+    const std::uint64_t messages = report.sources[i].messages;
+    message.status.push_back(input_diagnostics(
+        node_, report, i, rate_since(messages, last_messages_[i]), message.header.stamp.toSec()));
+    last_messages_[i] = messages;
   }
   message.status.push_back(pose_diagnostics(node_, report));
-  const double wanted_rate = report.joint_states ? rate_since(triggers, last_triggers_) : rate_;
-  message.status.push_back(
-      query_diagnostics(node_, report, rate_since(report.cycles, last_cycles_), wanted_rate));
+  message.status.push_back(query_diagnostics(node_, report, rate, wanted_rate));
   message.status.push_back(model_diagnostics(node_, model, contacts, contacts_wanted_));
   publish_message(publisher_, message);
 

@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ist_proximity/contact/contact_model.h"
@@ -27,11 +29,12 @@ class DiagnosticsPublisher {
   /// @param report    of the last cycle, with the joint states where they trigger the cycles
   /// @param contacts  null: none yet, or not wanted
   /// @param triggers  joint states that have triggered a cycle since the start
-  void publish(const CycleReport& report, const ModelState& model, const ContactModel* contacts,
+  void publish(CycleReport report, const ModelState& model, const ContactModel* contacts,
                std::uint64_t triggers);
 
  private:
   void log_status(std::uint8_t status, const std::string& text);
+  void note_since(std::chrono::steady_clock::time_point now, Findings* findings);
 
   const std::string node_;
   const double rate_;  ///< [Hz] ~rate
@@ -43,9 +46,11 @@ class DiagnosticsPublisher {
   std::size_t last_cycles_ = 0;
   std::uint64_t last_triggers_ = 0;
   std::vector<std::uint64_t> last_messages_;  ///< by source
-  std::uint8_t logged_ = 0;                   ///< the status that was logged last
-  int bad_ = 0;                               ///< [s] for which the status has not been OK
-  int since_logged_ = 0;                      ///< [s]
+  /// Since when there has been a finding, by what it concerns and its kind.
+  std::map<std::pair<std::string, Rank>, std::chrono::steady_clock::time_point> since_;
+  std::uint8_t logged_ = 0;  ///< the status that was logged last
+  int bad_ = 0;              ///< [s] for which the status has not been OK
+  int since_logged_ = 0;     ///< [s]
 };
 
 }  // namespace ist

@@ -118,7 +118,7 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
 
 DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state,
                                    const ContactModel* contacts, ContactsWanted contacts_wanted) {
-  DiagnosticStatus status = make_diagnostic(node, "model");
+  DiagnosticStatus status = make_diagnostic(node, "model", {});
   const bool ready = state.is_ready();
   if (!state.problem.empty()) {
     raise(state.is_loading() ? DiagnosticStatus::WARN : DiagnosticStatus::ERROR, state.problem,

@@ -38,22 +38,44 @@ struct DeadlineCost {
   void add(const DeadlineCost& other);
 };
 
+/// What kind of thing is not as it should be. The first kinds decide over the later ones.
+enum class Rank : std::uint8_t {
+  kModel,     ///< there is no model, or a link of it cannot be used
+  kLoading,   ///< the model is being made
+  kSilent,    ///< a required source has sent nothing
+  kStale,     ///< a required source is stale
+  kPose,      ///< a link's pose is not known
+  kUnusable,  ///< a required source's messages cannot be used
+  kDegraded,  ///< what is known is known less well
+  kRemark     ///< it does not change the status
+};
+
+/// One thing that is not as it should be. What the message, the diagnostics and the log say is the
+/// list of these.
+struct Finding {
+  Rank rank;
+  std::uint8_t code;   ///< of ProximityArray
+  std::uint8_t level;  ///< of diagnostic_msgs/DiagnosticStatus
+  std::string what;    ///< it concerns: "model", "pose", "query" or "input NAME"
+  std::string text;    ///< a sentence with its value, cause and cure
+  double since = 0.0;  ///< [s] for which there has been one of this kind; of diagnostics
+};
+using Findings = std::vector<Finding>;
+
+/// Adds a finding, with the usual code and level of its kind; none where the text is empty.
+void note(Rank rank, const std::string& what, const std::string& text, Findings* findings);
+/// Adds one for each text.
+void note(Rank rank, const std::string& what, const std::vector<std::string>& texts,
+          Findings* findings);
+
 /// Everything that decides the status of a ProximityArray.
 struct StatusInput {
-  std::string model_problem;             ///< not empty: there is no model, or not all of it (yet)
-  bool is_loading = false;               ///< `model_problem` says how far the model is
-  std::vector<std::string> link_errors;  ///< sentences on links without usable geometry
+  Findings findings;      ///< but for those of the members below
+  bool has_model = true;  ///< false: there is no model, or not all of it (yet)
   std::vector<SourceReport> sources;
-  std::vector<Status> source_statuses;     ///< by source
-  std::vector<std::string> pose_problems;  ///< one sentence each
-  std::vector<std::string> pose_doubts;    ///< poses that are known, and hardly true
-  std::string unknown_space_problem;       ///< why nothing of space is known; empty: it is
+  std::vector<Status> source_statuses;  ///< by source
   DeadlineCost deadline;
-  bool outside_region = false;  ///< a link is farther out than the joint limits allow
-  bool clock_runs = true;       ///< false: simulated time, and nothing on /clock yet
-
-  /// Whether nothing is wrong, so that nothing has to be said.
-  bool is_fine() const;
+  bool clock_runs = true;  ///< false: simulated time, and nothing on /clock yet
 };
 
 /// Whether queries may use clouds: every required source is usable, and at least one that can vouch
@@ -63,11 +85,13 @@ struct StatusInput {
 /// then. A memory never does.
 bool clouds_usable(const StatusInput& input);
 
-/// Decides the status of a ProximityArray. The first that applies: a model or link error;
-/// a model that is being made; a required source without any message; a stale required source; a
-/// missing pose; a required source whose messages cannot be used; a passed deadline and other
-/// doubts; OK. The text begins with the deciding sentence and continues with the others.
+/// Lists all findings, the deciding one first. The list is empty when nothing has to be said.
 /// @param now  [s] ROS clock
-Status overall_status(const StatusInput& input, double now);
+Findings find_all(const StatusInput& input, double now);
+
+/// Decides the status of a ProximityArray. The text begins with the deciding sentence and continues
+/// with the others.
+/// @param findings  of find_all()
+Status decide(const Findings& findings, bool clock_runs);
 
 }  // namespace ist
