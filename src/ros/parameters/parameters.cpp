@@ -47,7 +47,6 @@ std::vector<Parameter> startup_parameters(ServerConfig* config) {
       {"max_distance", &config->query.max_distance, Range::positive("m", 1e3)},
       {"packing/max_error", &config->model.packing.max_error, Range::positive("m", 1.0)},
       {"packing/max_spheres", &config->model.packing.max_spheres, {"", 1.0, 1e6}},
-      {"query/max_answers", &config->max_query_answers, {"", 1.0, 1e7}},
       {"penetration/enabled", choice(&config->contacts_wanted, {"auto", "true", "false"})},
       {"speed_scale/enabled", &config->speed_scale_enabled},
       {"self_collision/enabled", &self.enabled},

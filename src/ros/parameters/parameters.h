@@ -89,7 +89,6 @@ struct ServerConfig : LiveConfig {
   /// Links whose points self-filters drop. Empty: all with geometry, or the monitored ones.
   std::vector<std::string> self_filter_links;
   bool self_filter_all = false;
-  int max_query_answers = 100000;  ///< states times links of one ~query: 60 MB; > 0
   ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   SelfCollisionConfig self_collision;
   AttachConfig attach;

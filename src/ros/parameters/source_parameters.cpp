@@ -29,9 +29,6 @@ std::vector<Parameter> sensor_parameters(const std::string& at, SourceConfig* so
       {at + "frozen_after", &source->frozen_after, kTime},
       {at + "self_filter", &ingest.self_filter},
       {at + "self_filter_mode", choice(&ingest.self_filter_mode, {"padding", "view"})},
-      {at + "self_filter_view/noise_constant", &view.noise.constant, kMetre},
-      {at + "self_filter_view/noise_quadratic", &view.noise.quadratic,
-       Range::non_negative("1/m", 1.0)},
       {at + "self_filter_view/position_error", &view.position_error, {"m", kSmallest, 1.0}},
       {at + "self_filter_view/angle_error", &view.angle_error, {"rad", kSmallest, 1.0}},
   };
@@ -76,13 +73,12 @@ std::vector<Parameter> limit_parameters(const std::string& at, SourceConfig* sou
     case SourceType::kCloud:
     case SourceType::kDepthImage:
       return {{at + "max_points", &source->ingest.max_points, {"", 1.0, 1e9}}};
-    case SourceType::kScan:
-      return {{at + "max_beams", &source->scan.max_beams, {"", 1.0, 1e7}}};
     case SourceType::kMap:
       return {{at + "max_leaves", &source->map.max_leaves, {"", 1.0, 5e7}},
               {at + "max_bytes", &source->map.max_bytes, {"", 1.0, 2e9}}};
-    case SourceType::kWorld:
-      break;  // see read_world()
+    case SourceType::kScan:   // no scanner has more than a third of ScanLimits::max_beams
+    case SourceType::kWorld:  // see read_world()
+      break;
   }
   return {};
 }
@@ -138,8 +134,7 @@ void read_footprint(ParameterReader* reader, const std::string& name, ExtentConf
   double field_of_view = 0.0;
   reader->read_all({{name + "/radius", &config->footprint_radius, kMetre},
                     {name + "/angle", &config->footprint_angle, angle},
-                    {name + "/field_of_view", &field_of_view, Range::non_negative("rad", 3.0)},
-                    {name + "/incidence", &config->incidence, Range::non_negative("rad", 1.5)}});
+                    {name + "/field_of_view", &field_of_view, Range::non_negative("rad", 3.0)}});
   if (field_of_view > 0.0) config->field_of_view = field_of_view;
   const bool has_radius = reader->has(name + "/radius"), has_angle = reader->has(name + "/angle");
   config->footprint = has_radius  ? Footprint::kRadius
@@ -173,6 +168,14 @@ void read_extent(ParameterReader* reader, const std::string& at, ExtentConfig* c
   if (has_speed) {
     reader->read({at + "latency/speed", &config->speed, Range::non_negative("m/s", 20.0)});
   }
+}
+
+/// The self-filter by view rests on the sensor's noise where it is stated.
+void take_noise(IngestConfig* ingest) {
+  const ExtentConfig& stated = ingest->extent;
+  if (stated.noise_constant <= 0.0 && stated.noise_quadratic <= 0.0) return;
+  ingest->view.noise.constant = stated.noise_constant;
+  ingest->view.noise.quadratic = stated.noise_quadratic;
 }
 
 /// Adds an error where the points' radius at max_range [m] has no sensible size; `config` asks for
@@ -269,6 +272,7 @@ void read_source(ParameterReader* reader, const std::string& at, SourceConfig* s
     if (!reader->has("sensor_range")) source->ingest.sensor_range = usual_range(source->type);
     read_sensor(reader, at, source);
     read_extent(reader, at, &source->ingest.extent);
+    take_noise(&source->ingest);
     require_extent(reader, at, source->ingest.max_range, &source->ingest.extent);
   }
   reader->read_all(limit_parameters(at, source));
@@ -302,6 +306,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   reader->read({"cloud_timeout", &single.timeout, kTime});
   read_sensor(reader, "", &single);
   read_extent(reader, "", &single.ingest.extent);
+  take_noise(&single.ingest);
   reader->read_all(noise_filter_parameters("", &single.noise));
   reader->read_all(limit_parameters("", &single));
   read_memory(reader, "", &single.memory);

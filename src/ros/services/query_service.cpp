@@ -16,6 +16,7 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 // An answer with more states takes megabytes.
 constexpr std::size_t kManyStates = 1000;
+constexpr std::size_t kMaxAnswers = 100000;          // of one request: they take 60 MB
 constexpr std::chrono::seconds kReturnMemoryFor(5);  // a slow client reads the answer meanwhile
 
 /// Checks the times of a motion.
@@ -72,12 +73,10 @@ std::string QueryService::check_size(const Service::Request& request) const {
   const std::size_t states = request.states.size();
   const auto links = static_cast<std::size_t>(std::count(chosen_.begin(), chosen_.end(), true));
   const std::size_t pairs = request.self_proximity != 0 ? self_.size() : 0;
-  const auto max = static_cast<std::size_t>(config_.max_query_answers);
-  if (states <= max / std::max<std::size_t>(links + pairs, 1)) return "";
+  if (states <= kMaxAnswers / std::max<std::size_t>(links + pairs, 1)) return "";
   return std::to_string(states) + " states for " + std::to_string(links) + " links" +
          (pairs > 0 ? " and " + std::to_string(pairs) + " pairs" : "") + " are more than " +
-         std::to_string(max) +
-         " answers (~query/max_answers): ask in several requests, or for fewer links";
+         std::to_string(kMaxAnswers) + " answers: ask in several requests, or for fewer links";
 }
 
 void QueryService::return_memory() {

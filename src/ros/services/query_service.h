@@ -23,7 +23,7 @@
 namespace ist {
 
 /// Answers ~query in a thread of its own with a query of its own, so that requests never delay the
-/// cycle. ~query/deadline does not apply here; ~query/max_answers bounds a request's time and
+/// cycle. ~query/deadline does not apply here; the number of answers bounds a request's time and
 /// memory.
 class QueryService {
  public:
