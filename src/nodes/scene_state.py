@@ -51,6 +51,10 @@ class SceneState:
         self.octomap, self.matrix, self.matrix_fault = WorldOctomap(), {}, ""
 
     def apply(self, scene):
+        """Takes a scene. Where a limit is passed, which raises Fault, a full scene is needed next."""
+        attached = [one.object for one in scene.robot_state.attached_collision_objects]
+        stated = scene.world.collision_objects + attached
+        self._limit(sum(len(one.primitives) + len(one.meshes) + len(one.planes) for one in stated))
         if not scene.is_diff:
             self.objects, self.attached, self.faults, self.attach_faults = {}, {}, {}, {}
         self._attach_all(scene)
@@ -62,8 +66,11 @@ class SceneState:
         self._take_octomap(scene)
         self._take_matrix(scene)
         shapes = sum(len(one.shapes) for one in self.objects.values())
-        if max(shapes, len(self.faults), len(self.attach_faults)) > MAX_SHAPES:
-            raise Fault("it has more than %d shapes" % MAX_SHAPES)
+        self._limit(max(shapes, len(self.faults), len(self.attach_faults)))
+
+    def _limit(self, count):
+        if count > MAX_SHAPES:
+            raise Fault("it has %d shapes, allowed are %d" % (count, MAX_SHAPES))
 
     def _remove(self, name):
         self.objects.pop(name, None)
