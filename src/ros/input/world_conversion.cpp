@@ -1,6 +1,6 @@
 #include "ros/input/world_conversion.h"
 
-#include <sstream>
+#include <string>
 #include <vector>
 
 #include "internal/geometry/limits.h"
@@ -9,6 +9,7 @@
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/world_file.h"
 #include "ros/common/eigen_conversion.h"
+#include "ros/common/text.h"
 
 namespace ist {
 namespace {
@@ -21,8 +22,10 @@ std::vector<double> sizes(const Message& message, std::size_t count, const char*
                      " numbers; needed are " + std::to_string(count) + ": " + what);
   }
   for (const double size : message.dimensions) {
-    const std::string fault = size_fault("a size", size);
-    if (!fault.empty()) throw ModelError(fault + " (" + what + ")");
+    if (size > 0.0 && size <= kMaxLength) continue;
+    throw ModelError(
+        format_text("dimensions holds %g m; allowed is more than 0 and at most %g m (%s)", size,
+                    kMaxLength, what));
   }
   return message.dimensions;
 }
@@ -54,17 +57,21 @@ TriangleMesh stated_mesh(const Message& message, const Eigen::Vector3d& scale) {
   return mesh;
 }
 
-Shape mesh_of(const Message& message, const CancelRequest& cancelled) {
+Shape mesh_of(const Message& message, const PackageFinder& find_package,
+              const CancelRequest& cancelled) {
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
   if (!message.dimensions.empty()) {
     if (message.dimensions.size() != 3) throw ModelError("dimensions: 3 scales are needed");
     scale << message.dimensions[0], message.dimensions[1], message.dimensions[2];
   }
   if (message.mesh.empty()) return stated_mesh(message, scale);
-  return load_mesh(resolve_uri(message.mesh, environment_package_finder()), scale, cancelled);
+  return load_mesh(resolve_uri(message.mesh, find_package), scale, cancelled);
 }
 
-GeometryElement to_element(const Message& message, const CancelRequest& cancelled) {
+}  // namespace
+
+GeometryElement to_element(const Message& message, const PackageFinder& find_package,
+                           const CancelRequest& cancelled) {
   GeometryElement element;
   switch (message.shape) {
     case Message::BOX: {
@@ -89,7 +96,7 @@ GeometryElement to_element(const Message& message, const CancelRequest& cancelle
       element = half_space(Eigen::Vector3d::UnitZ(), 0.0);
       break;
     case Message::MESH:
-      element.shape = mesh_of(message, cancelled);
+      element.shape = mesh_of(message, find_package, cancelled);
       break;
     default:
       throw ModelError("shape is " + std::to_string(message.shape) + "; allowed is 0 to 5");
@@ -97,8 +104,6 @@ GeometryElement to_element(const Message& message, const CancelRequest& cancelle
   element.source = message.mesh.empty() ? "its shape" : printable(message.mesh);
   return element;
 }
-
-}  // namespace
 
 Eigen::Isometry3d to_object_pose(const geometry_msgs::Pose& pose) {
   geometry_msgs::Transform transform;
@@ -116,7 +121,7 @@ WorldObject to_world_object(const Message& message, const WorldConfig& config,
   object.name = message.id;
   object.frame = message.header.frame_id.empty() ? config.frame_id : message.header.frame_id;
   object.X_BO = to_object_pose(message.pose);
-  object.geometry = {to_element(message, cancelled)};
+  object.geometry = {to_element(message, environment_package_finder(), cancelled)};
   if (!(message.margin >= 0.0)) {
     throw ModelError("margin is " + std::to_string(message.margin) + " m; it must be 0 or more");
   }

@@ -8,6 +8,7 @@
 
 #include "internal/geometry/cancelled.h"
 #include "ist_proximity/proximity/known_world.h"
+#include "ist_proximity/robot/robot_description.h"
 #include "ros/parameters/source_config.h"
 
 namespace ist {
@@ -17,6 +18,11 @@ namespace ist {
 /// @throws ModelError, Cancelled
 WorldObject to_world_object(const ist_proximity::WorldObject& message, const WorldConfig& config,
                             const CancelRequest& cancelled);
+
+/// Converts the shape of a message of ADD, in the object's frame.
+/// @throws ModelError naming the field that is wrong, its value and what is allowed; Cancelled
+GeometryElement to_element(const ist_proximity::WorldObject& message,
+                           const PackageFinder& find_package, const CancelRequest& cancelled);
 
 /// Converts a pose.
 /// @throws ModelError
