@@ -4,6 +4,7 @@ genpy computes the md5sums and writes the bytes, so that the node's own reader i
 itself. Comments of the definitions are left out; they are no part of the md5sum.
 """
 
+import functools
 import hashlib
 
 import genpy.dynamic
@@ -140,6 +141,7 @@ def get_planning_scene_type(types):
     return Service
 
 
+@functools.lru_cache
 def planning_scene_types(is_noetic):
     """Classes by the names of messages: moveit_msgs/PlanningScene and all that it holds."""
     definitions = dict(OTHERS)
