@@ -154,18 +154,25 @@ class SceneState:
             self.objects.setdefault(in_world, known.but(name=in_world, target=self.fixed_frame))
 
     def restate(self, look_up):
-        """Makes objects stand in their new frames, where they are now. `look_up` gives X_TB or raises Fault."""
+        """Makes objects stand in their new frames, where they are now. `look_up` gives X_TB or raises Fault.
+
+        Returns whether anything has changed."""
+        is_changed = False
         for name, one in list(self.objects.items()):
             if one.target is None:
                 continue
             try:
                 X_TB = IDENTITY if one.target == one.frame else look_up(one.target, one.frame)
             except Fault as fault:
-                text = "it moves with frame '%s' from now on, but it is not known where: %s"
-                self.faults[name] = sentence(name, text % (one.target, fault))
+                text = "it moves with frame '%s' in place of '%s' from now on, but it is not known where: %s"
+                told = sentence(name, text % (one.target, one.frame, fault))
+                is_changed |= self.faults.get(name) != told
+                self.faults[name] = told
                 continue
+            is_changed = True
             self.objects[name] = one.but(frame=one.target, X_BP=compose(X_TB, one.X_BP), target=None)
             self.faults.pop(name, None)
+        return is_changed
 
     def _take_octomap(self, scene):
         stated = scene.world.octomap
