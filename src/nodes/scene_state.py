@@ -165,9 +165,8 @@ class SceneState:
                 X_TB = IDENTITY if one.target == one.frame else look_up(one.target, one.frame)
             except Fault as fault:
                 text = "it moves with frame '%s' in place of '%s' from now on, but it is not known where: %s"
-                told = sentence(name, text % (one.target, one.frame, fault))
-                is_changed |= self.faults.get(name) != told
-                self.faults[name] = told
+                is_changed |= name not in self.faults
+                self.faults.setdefault(name, sentence(name, text % (one.target, one.frame, fault)))
                 continue
             is_changed = True
             self.objects[name] = one.but(frame=one.target, X_BP=compose(X_TB, one.X_BP), target=None)
