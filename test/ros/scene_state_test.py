@@ -102,12 +102,17 @@ class SceneStateTest(unittest.TestCase):
             shapes = [
                 scenes.box(pose((1, 0, 0)), (0.1, 0.2, 0.3)),
                 ("primitive", scenes.make("shape_msgs/SolidPrimitive", type=3, dimensions=[2.0, 0.5]), None),
-                ("mesh", scenes.make("shape_msgs/Mesh", triangles=[triangle], vertices=corners), pose((0, 5, 0), QUARTER)),
+                (
+                    "mesh",
+                    scenes.make("shape_msgs/Mesh", triangles=[triangle], vertices=corners),
+                    pose((0, 5, 0), QUARTER),
+                ),
                 ("plane", scenes.make("shape_msgs/Plane", coef=[0.0, 2.0, 0.0, 1.0]), pose((0, 0, 1))),
             ]
             state = scenes.send(scenes.object("all", shapes, at=pose((0, 0, 0.25))), is_diff=False)
             box, cylinder, mesh, plane = state.objects["all"].messages(["arm"])
-            self.assertEqual([m.operation for m in (box, cylinder, mesh, plane)], [WorldObject.ADD] + 3 * [WorldObject.APPEND])
+            operations = [m.operation for m in (box, cylinder, mesh, plane)]
+            self.assertEqual(operations, [WorldObject.ADD] + 3 * [WorldObject.APPEND])
             self.assertEqual((box.header.frame_id, box.id, box.allowed_links), ("world", "all", ["arm"]))
             self.assertEqual((box.shape, list(box.dimensions)), (WorldObject.BOX, [0.1, 0.2, 0.3]))
             self.near(place_of(box)[0], [1, 0, z])
@@ -156,7 +161,10 @@ class SceneStateTest(unittest.TestCase):
 
     def test_one_that_cannot_be_used_is_named_alone(self):
         for scenes in self.each_layout():
-            solid = lambda **fields: ("primitive", scenes.make("shape_msgs/SolidPrimitive", **fields), pose((0, 0, 0)))
+
+            def solid(**fields):
+                return ("primitive", scenes.make("shape_msgs/SolidPrimitive", **fields), pose((0, 0, 0)))
+
             triangle = scenes.make("shape_msgs/MeshTriangle", vertex_indices=[0, 1, 3])
             mesh = scenes.make("shape_msgs/Mesh", triangles=[triangle], vertices=[pose((0, 0, 0)).position] * 3)
             for shape, said in (
@@ -180,9 +188,11 @@ class SceneStateTest(unittest.TestCase):
 
     def test_attached_objects_stay_until_they_are_detached(self):
         for scenes in self.each_layout():
-            attach = lambda name, link, operation=ADD: scenes.attachment(
-                link, scenes.object(name, [scenes.box()] if operation == ADD else [], operation, link or "world"), ["finger"]
-            )
+
+            def attach(name, link, operation=ADD):
+                shapes = [scenes.box()] if operation == ADD else []
+                return scenes.attachment(link, scenes.object(name, shapes, operation, link or "world"), ["finger"])
+
             some = [attach("cup", "hand"), attach("drill", "hand"), attach("hat", "head"), attach("saw", "foot")]
             state = scenes.send(attached=some, is_diff=False)
             self.assertIn("'cup' (to 'hand'), 'drill' (to 'hand'), 'hat' (to 'head') and 1 more: ", state.doubt())

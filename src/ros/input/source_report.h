@@ -54,12 +54,12 @@ struct SourceReport {
   double newest = std::numeric_limits<double>::quiet_NaN();
   /// [s] for which the present message has been read and ingested; 0: none is.
   double working = 0.0;
-  double last_work = 0.0;      ///< [s] what reading and ingesting the last message took
-  double warm_up_time = 0.0;   ///< [s] what its first answer took; 0: there was no warm-up
-  std::string problem;         ///< why the last message is not in use (yet); empty when it is
-  std::string doubt;           ///< about messages that are used all the same; empty: none
+  double last_work = 0.0;       ///< [s] what reading and ingesting the last message took
+  double warm_up_time = 0.0;    ///< [s] what its first answer took; 0: there was no warm-up
+  std::string problem;          ///< why the last message is not in use (yet); empty when it is
+  std::string doubt;            ///< about messages that are used all the same; empty: none
   std::string doubt_of_sender;  ///< that it is gone, and what it told is held; empty: none
-  std::string doubt_of_place;  ///< about where its frame is, which is used all the same, or that of its sender; or empty
+  std::string doubt_of_place;   ///< about where its frame is, or doubt_of_sender; empty: none
   /// Objects of a known world that cannot be used, though others can, or what the source's memory
   /// has lost; empty: none.
   std::string incomplete;

@@ -23,8 +23,7 @@ constexpr std::uint32_t kQueueSize = 1000;
 
 WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
                          const TransformBuffer& buffer)
-    : Source(config, nh, buffer, ""),
-      builder_(config.world.limits) {
+    : Source(config, nh, buffer, ""), builder_(config.world.limits) {
   if (!config.world.robot.description.empty()) {
     robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, nh);
     is_robot_read_ = false;

@@ -28,9 +28,9 @@ namespace ist {
 /// The frame of objects that stand still in the fixed frame, whatever that is.
 constexpr const char* kFixedFrame = "(fixed frame)";
 
-/// A known world: objects from parameters, from a MoveIt scene file and from a topic (WorldObjects),
-/// and the links of another robot. A thread of its own reads meshes
-/// and builds hierarchies, so that no query waits for them.
+/// A known world: objects from parameters, from a MoveIt scene file and from a topic
+/// (WorldObjects), and the links of another robot. A thread of its own reads meshes and builds
+/// hierarchies, so that no query waits for them.
 ///
 /// Objects are placed when a query asks for them, at the poses of their frames at that time. Where
 /// one of these is not known, or an object cannot be used, the source is not OK and says so.
