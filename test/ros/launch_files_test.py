@@ -134,6 +134,16 @@ class LaunchFilesTest(unittest.TestCase):
         self.assertAlmostEqual(pt.link(robot.answer, "box_link").distance, 0.025, delta=0.0011)
         robot.stop()
 
+    def test_planning_scenes(self):
+        """The bridge is started where it is asked for, and its objects are those of the cell."""
+        self.assertNotIn("planning_scene_bridge", [n.type for n in loaded("cell.launch").nodes])
+        config = loaded("cell.launch", "planning_scene:=/scenes", "fixed_frame:=world", "name:=near")
+        (bridge,) = [n for n in config.nodes if n.type == "planning_scene_bridge"]
+        self.assertIn(("planning_scene", "/scenes"), bridge.remap_args)
+        self.assertEqual(config.params["/near_planning_scene_bridge/fixed_frame"].value, "world")
+        self.assertEqual(config.params["/near/sources/cell/topic"].value, "world_objects")
+        self.assertTrue(pt.find_program("ist_proximity", bridge.type))
+
     def test_common_arguments(self):
         """roslaunch drops arguments that a file does not know, without a word."""
         common = launch_arguments("proximity.launch") - {"cloud"}
