@@ -222,13 +222,13 @@ void ProximityServer::Impl::run_cycle() {
   }
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
-    report_.transform_problem = transform_problem;
     if (cycle_) {
       cycle_->report(*message, &report_);
     } else {
       fill_without_model(*model_, config_, std::max(now, last_stamp_), sources_, message.get(),
                          &report_);
     }
+    note(Rank::kRemark, "pose", transform_problem, &report_.findings);
     ++report_.cycles;
   }
   last_stamp_ = message->header.stamp;
@@ -261,15 +261,23 @@ void ProximityServer::Impl::publish_diagnostics_when_due() {
 
 void ProximityServer::Impl::publish_diagnostics() {
   CycleReport report;
+  std::string counted_problem;
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
     report = report_;
+    counted_problem = counted_problem_;
     report_.worst_deadline = DeadlineCost();
   }
   report.parameter_problem = live_.problem();
-  report.parameters_without_effect = live_.without_effect();
+  for (const std::string& remark :
+       {report.parameter_problem, live_.without_effect(), counted_problem}) {
+    note(Rank::kRemark, "query", remark, &report.findings);
+  }
   spheres_.show_finer(*loader_.state());
-  if (joint_states_) report.joint_states = joint_states_->report();
+  if (joint_states_) {
+    report.joint_states = joint_states_->report();
+    note(Rank::kRemark, "pose", report.joint_states->problem, &report.findings);
+  }
   diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                        joint_states_received_);
 }

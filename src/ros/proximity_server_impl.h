@@ -106,7 +106,8 @@ class ProximityServer::Impl {
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   std::mutex report_mutex_;
-  CycleReport report_;  ///< of the cycle, for the diagnostics
+  CycleReport report_;           ///< of the cycle, for the diagnostics
+  std::string counted_problem_;  ///< what is wrong with names of links that are configured
 
   // Used by the thread of ~query alone.
   Clock::time_point next_diagnostics_ = Clock::now() + std::chrono::seconds(1);

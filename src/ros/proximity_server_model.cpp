@@ -78,11 +78,11 @@ void ProximityServer::Impl::choose_counted_links() {
     }
   }
   const std::lock_guard<std::mutex> lock(report_mutex_);
-  if (!problem.empty() && problem != report_.counted_problem) ROS_WARN_STREAM(problem);
+  if (!problem.empty() && problem != counted_problem_) ROS_WARN_STREAM(problem);
   if (!counted_.explanation.empty() && counted_.explanation != before.explanation) {
     ROS_INFO_STREAM(counted_.explanation);
   }
-  report_.counted_problem = problem;
+  counted_problem_ = problem;
   report_.counted_links = counted_.explanation;
 }
 

@@ -46,8 +46,6 @@ struct CycleReport {
   std::vector<SourceReport> sources;
   std::vector<Status> source_statuses;           ///< by source
   std::string parameter_problem;                 ///< LiveParameters::problem()
-  std::string parameters_without_effect;         ///< LiveParameters::without_effect()
-  std::string transform_problem;                 ///< a transform that the tf listener rejected
   std::optional<JointStateReport> joint_states;  ///< null with pose_source tf
   std::size_t links_known = 0, links_monitored = 0;
   double pose_age = 0.0;   ///< [s] of the poses' common instant, when any link is known
@@ -60,7 +58,6 @@ struct CycleReport {
   double min_distance = 0.0;         ///< [m] as on ~min_distance; NaN: not known
   std::string speed_scale;           ///< the scale, the rule and the link; empty: not enabled
   std::string counted_links;         ///< which links do not count in both, and why
-  std::string counted_problem;       ///< what is wrong with names of links that are configured
   std::size_t query_memory = 0;      ///< [bytes] of the cycle's query
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
 

@@ -139,22 +139,16 @@ DiagnosticStatus make_diagnostic(const std::string& node, const std::string& wha
   status.hardware_id = node;
   status.level = DiagnosticStatus::OK;
   status.message = "OK";
-  double since = 0.0;
+  const Finding* worst = nullptr;
   for (const Finding& finding : findings) {
-    if (finding.what != what) continue;
-    if (finding.level > static_cast<std::uint8_t>(status.level)) since = finding.since;
-    raise(finding.level, finding.text, &status);
+    if (finding.what != what || (worst && finding.level <= worst->level)) continue;
+    worst = &finding;
   }
-  if (status.level > DiagnosticStatus::OK) {
-    add_value("since", format_text("%.0f s", since), &status);
-  }
+  if (!worst) return status;
+  status.level = static_cast<decltype(status.level)>(worst->level);
+  status.message = worst->text;
+  add_value("since", format_text("%.0f s", worst->since), &status);
   return status;
-}
-
-void raise(std::uint8_t level, const std::string& message, DiagnosticStatus* status) {
-  if (level <= static_cast<std::uint8_t>(status->level)) return;
-  status->level = static_cast<decltype(status->level)>(level);
-  status->message = message;
 }
 
 void add_value(const std::string& key, const std::string& value, DiagnosticStatus* status) {
@@ -196,14 +190,9 @@ void add_remarks(double rate, double wanted_rate, CycleReport* report) {
     note(Rank::kRemark, "query", "the rate is lower than " + wanted + ": the machine is too busy",
          findings);
   }
-  note(Rank::kRemark, "query", report->parameter_problem, findings);
-  note(Rank::kRemark, "query", report->parameters_without_effect, findings);
-  note(Rank::kRemark, "query", report->counted_problem, findings);
   if (report->links_monitored == 0) {
     note(Rank::kRemark, "pose", std::string("no link is looked up yet"), findings);
   }
-  note(Rank::kRemark, "pose", report->transform_problem, findings);
-  if (report->joint_states) note(Rank::kRemark, "pose", report->joint_states->problem, findings);
 }
 
 DiagnosticStatus input_diagnostics(const std::string& node, const CycleReport& report,

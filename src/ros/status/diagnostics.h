@@ -17,6 +17,8 @@ namespace ist {
 /// Adds what no status of a message says.
 /// @param wanted_rate  [Hz] ~rate, or the rate of the joint states
 void add_remarks(double rate, double wanted_rate, CycleReport* report);
+/// Adds what is found of a model besides what a status says of it.
+void note_model(const ModelState& state, Findings* findings);
 
 // Pure functions that give one DiagnosticStatus each, of the report's findings and of numbers;
 // `node` begins every name. Other programs read the keys, so they stay as they are.
@@ -36,6 +38,7 @@ diagnostic_msgs::DiagnosticStatus query_diagnostics(const std::string& node,
                                                     double wanted_rate);
 /// @param contacts  null: none yet, or not wanted
 diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
+                                                    const Findings& findings,
                                                     const ModelState& state,
                                                     const ContactModel* contacts,
                                                     ContactsWanted contacts_wanted);
@@ -45,10 +48,6 @@ diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
 /// Makes the status named "NODE: WHAT", of what is found of it.
 diagnostic_msgs::DiagnosticStatus make_diagnostic(const std::string& node, const std::string& what,
                                                   const Findings& findings);
-
-/// Raises the level and replaces the message, unless the level is as high already.
-void raise(std::uint8_t level, const std::string& message,
-           diagnostic_msgs::DiagnosticStatus* status);
 
 void add_value(const std::string& key, const std::string& value,
                diagnostic_msgs::DiagnosticStatus* status);

@@ -71,6 +71,7 @@ void DiagnosticsPublisher::publish(CycleReport report, const ModelState& model,
   const double rate = rate_since(report.cycles, last_cycles_);
   const double wanted_rate = report.joint_states ? rate_since(triggers, last_triggers_) : rate_;
   add_remarks(rate, wanted_rate, &report);
+  note_model(model, &report.findings);
   note_since(now, &report.findings);
   diagnostic_msgs::DiagnosticArray message;
   message.header.stamp = ros::Time::now();
@@ -83,7 +84,8 @@ void DiagnosticsPublisher::publish(CycleReport report, const ModelState& model,
   }
   message.status.push_back(pose_diagnostics(node_, report));
   message.status.push_back(query_diagnostics(node_, report, rate, wanted_rate));
-  message.status.push_back(model_diagnostics(node_, model, contacts, contacts_wanted_));
+  message.status.push_back(
+      model_diagnostics(node_, report.findings, model, contacts, contacts_wanted_));
   publish_message(publisher_, message);
 
   last_time_ = now;

@@ -57,8 +57,12 @@ void add_contacts(const ModelState& state, const ContactModel* contacts, Contact
             status);
 }
 
-/// Adds the packing of a link that is usable.
-void add_link(const LinkModel& link, DiagnosticStatus* status) {
+bool falls_short(const LinkModel& link) {
+  return link.usable() && link.is_final && !link.packing.certificate.reached;
+}
+
+/// The packing of a link that is usable.
+std::string packing_text(const LinkModel& link) {
   const PackingCertificate& certificate = link.packing.certificate;
   std::string text = std::string(link.is_final ? "final" : "coarse") + ", " +
                      std::to_string(link.packing.spheres.size()) + " spheres, largest gap " +
@@ -67,13 +71,9 @@ void add_link(const LinkModel& link, DiagnosticStatus* status) {
   if (certificate.unreachable_area > 0) {
     text += format_text(", %.1f cm2 of sheets", 1e4 * certificate.unreachable_area);
   }
-  if (link.is_final && !certificate.reached) {
-    text += ", ~packing/max_error not reached";
-    raise(DiagnosticStatus::WARN, "link '" + link.name + "': " + text, status);
-  }
-  text +=
-      link.from_cache ? ", from the cache" : format_text(", packed in %.1f s", link.packing_time);
-  add_value(link.name, text, status);
+  if (falls_short(link)) text += ", ~packing/max_error not reached";
+  return text + (link.from_cache ? ", from the cache"
+                                 : format_text(", packed in %.1f s", link.packing_time));
 }
 
 double megabytes(std::size_t bytes) { return 1e-6 * static_cast<double>(bytes); }
@@ -116,14 +116,20 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
 
 }  // namespace
 
-DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state,
-                                   const ContactModel* contacts, ContactsWanted contacts_wanted) {
-  DiagnosticStatus status = make_diagnostic(node, "model", {});
-  const bool ready = state.is_ready();
-  if (!state.problem.empty()) {
-    raise(state.is_loading() ? DiagnosticStatus::WARN : DiagnosticStatus::ERROR, state.problem,
-          &status);
+void note_model(const ModelState& state, Findings* findings) {
+  for (const std::size_t i : state.monitored) {
+    const LinkModel& link = state.robot->links[i];
+    if (!falls_short(link)) continue;
+    note(Rank::kRemark, "model", "link '" + link.name + "': " + packing_text(link), findings);
   }
+  note(Rank::kRemark, "model", state.warnings, findings);
+}
+
+DiagnosticStatus model_diagnostics(const std::string& node, const Findings& findings,
+                                   const ModelState& state, const ContactModel* contacts,
+                                   ContactsWanted contacts_wanted) {
+  DiagnosticStatus status = make_diagnostic(node, "model", findings);
+  const bool ready = state.is_ready();
   add_value("ready", ready ? "100 %" : format_text("%.0f %%", 100 * state.fraction), &status);
   add_value("links monitored", state.links.size(), &status);
   if (ready) add_value("links", link_counts(state), &status);
@@ -134,19 +140,11 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
   for (const std::size_t i : state.monitored) {
     const LinkModel& link = state.robot->links[i];
     if (is_pending(link)) continue;
-    if (!link.usable()) {
-      raise(DiagnosticStatus::ERROR, link.error, &status);
-      add_value(link.name, link.error, &status);
-      continue;
-    }
-    add_link(link, &status);
+    add_value(link.name, link.usable() ? packing_text(link) : link.error, &status);
   }
   add_packings(state, &status);
   add_contacts(state, contacts, contacts_wanted, &status);
-  for (const std::string& warning : state.warnings) {
-    raise(DiagnosticStatus::WARN, warning, &status);
-    add_value("warning", warning, &status);
-  }
+  for (const std::string& warning : state.warnings) add_value("warning", warning, &status);
   return status;
 }
 

@@ -15,6 +15,13 @@ using ist_proximity::ProximityArray;
 
 constexpr std::size_t kMaxSentences = 6;  // a status_text is meant to be read
 
+std::uint8_t level_of(std::uint8_t code) {
+  if (code == ProximityArray::STALE_CLOUD) return DiagnosticStatus::STALE;
+  const bool is_error = code == ProximityArray::NO_CLOUD || code == ProximityArray::NO_POSE ||
+                        code == ProximityArray::MODEL_ERROR;
+  return is_error ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN;
+}
+
 /// Which sources there are, and which of them can be used.
 struct Vouchers {
   explicit Vouchers(const StatusInput& input) {
@@ -115,18 +122,12 @@ bool clouds_usable(const StatusInput& input) {
 }
 
 void note(Rank rank, const std::string& what, const std::string& text, Findings* findings) {
-  static const struct {
-    std::uint8_t code, level;
-  } kUsual[] = {{ProximityArray::MODEL_ERROR, DiagnosticStatus::ERROR},
-                {ProximityArray::LOADING, DiagnosticStatus::WARN},
-                {ProximityArray::NO_CLOUD, DiagnosticStatus::ERROR},
-                {ProximityArray::STALE_CLOUD, DiagnosticStatus::STALE},
-                {ProximityArray::NO_POSE, DiagnosticStatus::ERROR},
-                {ProximityArray::NO_CLOUD, DiagnosticStatus::ERROR},
-                {ProximityArray::DEGRADED, DiagnosticStatus::WARN},
-                {ProximityArray::OK, DiagnosticStatus::WARN}};
-  const auto& usual = kUsual[static_cast<std::size_t>(rank)];
-  if (!text.empty()) findings->push_back({rank, usual.code, usual.level, what, text});
+  static constexpr std::uint8_t kCodes[] = {
+      ProximityArray::MODEL_ERROR, ProximityArray::LOADING, ProximityArray::NO_CLOUD,
+      ProximityArray::STALE_CLOUD, ProximityArray::NO_POSE, ProximityArray::NO_CLOUD,
+      ProximityArray::DEGRADED,    ProximityArray::OK};
+  const std::uint8_t code = kCodes[static_cast<std::size_t>(rank)];
+  if (!text.empty()) findings->push_back({rank, code, level_of(code), what, text});
 }
 
 void note(Rank rank, const std::string& what, const std::vector<std::string>& texts,
