@@ -191,7 +191,7 @@ void add_remarks(double rate, double wanted_rate, CycleReport* report) {
          findings);
   }
   if (report->links_monitored == 0) {
-    note(Rank::kRemark, "pose", std::string("no link is looked up yet"), findings);
+    note(Rank::kRemark, "pose", "no link is looked up yet", findings);
   }
 }
 

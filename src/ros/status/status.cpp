@@ -73,9 +73,7 @@ void note_sources(const StatusInput& input, double now, Findings* findings) {
     note(rank, what, status.text, findings);
     Finding& own = findings->back();
     if (rank == Rank::kUnusable) own.code = status.code;
-    own.level = !source.required                             ? DiagnosticStatus::WARN
-                : status.code == ProximityArray::STALE_CLOUD ? DiagnosticStatus::STALE
-                                                             : DiagnosticStatus::ERROR;
+    own.level = source.required ? level_of(status.code) : std::uint8_t{DiagnosticStatus::WARN};
   }
 }
 
