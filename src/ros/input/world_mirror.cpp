@@ -1,5 +1,6 @@
 // This part of WorldSource keeps to a sender that mirrors a scene of its own, such as MoveIt's.
 
+#include <chrono>
 #include <string>
 #include <utility>
 
@@ -13,10 +14,14 @@ namespace {
 
 using Kind = WorldFaultKind;
 
+// A mirror says something every second.
+constexpr std::chrono::seconds kSilence(5);
+
 }  // namespace
 
 /// Notes what a message that was applied or refused says of the scene as a whole.
 void WorldSource::take_from_mirror(const ist_proximity::WorldObjects& message) {
+  mirrored_at_ = std::chrono::steady_clock::now();
   const WorldFaultKey scene = fault_of(Kind::kScene);
   const auto refused = faults_.find(fault_of(Kind::kMessage));
   if (refused != faults_.end()) {
@@ -79,15 +84,16 @@ void WorldSource::use_octomap(const ist_proximity::WorldOctomap& message) {
   is_changed_ = true;
 }
 
-/// Says that the sender has ended: what it has told is held as it was. The next one need not have
-/// the same objects.
-void WorldSource::note_publishers(std::uint32_t publishers) {
-  if (publishers == 0) has_whole_scene_ = false;
+/// Says that the sender is silent, which repeats itself otherwise: what it has told is held as it
+/// was.
+void WorldSource::note_silence() {
+  const bool is_silent = std::chrono::steady_clock::now() - mirrored_at_ > kSilence;
+  if (is_silent == std::exchange(is_silent_, is_silent)) return;
   update([&](SourceReport* report) {
     report->doubt_of_sender =
-        publishers > 0 ? ""
-                       : "nothing publishes " + report->topic +
-                             " any more (planning_scene_bridge): its objects are held as they were";
+        is_silent ? "nothing comes on " + report->topic +
+                        " any more (planning_scene_bridge): its objects are held as they were"
+                  : "";
   });
 }
 

@@ -93,6 +93,7 @@ void WorldSource::change_all(const std::vector<ist_proximity::WorldObject>& obje
                  "object '" + printable(object.id) + "': " + error.what());
     }
   }
+  if (added.empty()) return show_faults();
   add(Kind::kMessage, added);
 }
 

@@ -61,8 +61,8 @@ void WorldSource::run() {
     guard(Kind::kMessage, [this] { queue_.callAvailable(kPoll); });
     guard(Kind::kWork, [this] {
       if (!is_robot_read_) read_robot();
-      const std::optional<std::uint32_t> publishers = count_publishers();
-      if (publishers && is_mirror_) note_publishers(*publishers);
+      count_publishers();
+      if (is_mirror_) note_silence();
       take_target();
       if (is_changed_ && target_.model) publish();
       free_unused();

@@ -58,7 +58,7 @@ class WorldSource : public Source {
   void append(const ist_proximity::WorldObject& message, std::vector<WorldObject>* added);
   void take_from_mirror(const ist_proximity::WorldObjects& message);
   void use_octomap(const ist_proximity::WorldOctomap& message);
-  void note_publishers(std::uint32_t publishers);
+  void note_silence();
   void remember_from_topic(const std::string& name);
   std::string frame_of(const std::string& stated) const;
   void add(WorldFaultKind what, const std::vector<WorldObject>& objects);
@@ -87,9 +87,11 @@ class WorldSource : public Source {
   std::set<std::string> from_topic_;                    ///< names of objects
   std::set<std::string> configured_;  ///< names of parameters, the file and the other robot
   bool is_mirror_ = false;            ///< whether the topic's sender mirrors a scene of its own
-  bool has_whole_scene_ = false;      ///< whether all of that scene has come
-  std::string doubt_;                 ///< the mirror's
-  std::shared_ptr<const BoxIndex> octomap_;  ///< of a mirror; null: none
+  bool is_silent_ = false;            ///< whether that sender is
+  std::chrono::steady_clock::time_point mirrored_at_;  ///< receipt of its last message
+  bool has_whole_scene_ = false;                       ///< whether all of that scene has come
+  std::string doubt_;                                  ///< the mirror's
+  std::shared_ptr<const BoxIndex> octomap_;            ///< of a mirror; null: none
   std::string octomap_frame_;
   /// Worlds that queries may still have: a large one takes milliseconds to free.
   std::vector<std::shared_ptr<const KnownWorld>> made_;
