@@ -26,7 +26,7 @@ endif()
 target_link_libraries(test_support PUBLIC
   test_helpers ist_proximity_core ist_proximity::hwy GTest::GTest)
 
-# OctoMap's own library is what the reader of its maps is measured against.
+# The libraries whose types users have in hand. The tests of their headers need them, and nothing else.
 find_path(OCTOMAP_INCLUDE_DIR octomap/octomap.h)
 find_library(OCTOMAP_LIBRARY octomap)
 find_library(OCTOMATH_LIBRARY octomath)
@@ -35,7 +35,20 @@ set(octomap_FOUND OFF)
 if(OCTOMAP_INCLUDE_DIR AND OCTOMAP_LIBRARY AND OCTOMATH_LIBRARY)
   set(octomap_FOUND ON)
 else()
-  message(STATUS "ist_proximity: no octree_test and memory_octomap_test, OctoMap is missing (apt install liboctomap-dev)")
+  message(STATUS "ist_proximity: no octomap_test, octree_test and memory_octomap_test, OctoMap is missing (apt install liboctomap-dev)")
+endif()
+# Not find_package(PCL): it looks for VTK, OpenNI and Qt, too, which takes longer than all the rest.
+find_path(PCL_INCLUDE_DIR pcl/point_cloud.h
+  PATH_SUFFIXES pcl-1.15 pcl-1.14 pcl-1.13 pcl-1.12 pcl-1.11 pcl-1.10)
+find_library(PCL_COMMON_LIBRARY pcl_common)
+find_library(PCL_IO_LIBRARY pcl_io)
+find_library(PCL_IO_PLY_LIBRARY pcl_io_ply)
+mark_as_advanced(PCL_INCLUDE_DIR PCL_COMMON_LIBRARY PCL_IO_LIBRARY PCL_IO_PLY_LIBRARY)
+set(pcl_FOUND OFF)
+if(PCL_INCLUDE_DIR AND PCL_COMMON_LIBRARY AND PCL_IO_LIBRARY AND PCL_IO_PLY_LIBRARY)
+  set(pcl_FOUND ON)
+else()
+  message(STATUS "ist_proximity: no pcl_test, PCL is missing (apt install libpcl-dev)")
 endif()
 
 # ist_proximity_gtest(TARGET [ARGUMENT...]): makes a GoogleTest program a core test.
@@ -79,7 +92,8 @@ foreach(source IN LISTS core_test_sources)
     endif()
   endif()
   get_filename_component(test ${source} NAME_WE)
-  if((test MATCHES "^(octree|memory_octomap)_test$" AND NOT octomap_FOUND) OR
+  if((test MATCHES "^(octomap|octree|memory_octomap)_test$" AND NOT octomap_FOUND) OR
+     (test STREQUAL "pcl_test" AND NOT pcl_FOUND) OR
      (test STREQUAL "pack_robot_test" AND NOT TARGET pack_robot))
     continue()
   endif()
@@ -99,7 +113,12 @@ foreach(source IN LISTS core_test_sources)
   if(test MATCHES "^(closed_loop|closing_speed|dodge_controller|simulator)_test$")
     target_link_libraries(${test} PRIVATE ist_proximity_simulator)
   endif()
-  if(test MATCHES "^(octree|memory_octomap)_test$")
+  if(test STREQUAL "pcl_test")
+    target_include_directories(${test} SYSTEM PRIVATE ${PCL_INCLUDE_DIR})
+    target_link_libraries(${test} PRIVATE
+      ${PCL_IO_LIBRARY} ${PCL_IO_PLY_LIBRARY} ${PCL_COMMON_LIBRARY})
+  endif()
+  if(test MATCHES "^(octomap|octree|memory_octomap)_test$")
     target_include_directories(${test} SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
     target_link_libraries(${test} PRIVATE ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
   endif()

@@ -18,6 +18,12 @@ struct NumberFormat {
     return size == 1 || size == 2 || size == 4 || size == 8;
   }
 
+  /// The number that a text stands for: a float32's digits are not all its own.
+  double nearest(double value) const {
+    return kind == Kind::kFloat && size == 4 ? static_cast<double>(static_cast<float>(value))
+                                             : value;
+  }
+
   /// Reads the number at `data`, of `size` bytes.
   double read(const char* data) const {
     std::uint64_t bits = 0;

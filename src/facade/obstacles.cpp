@@ -1,13 +1,16 @@
 #include "ist_proximity/facade/obstacles.h"
 
 #include <algorithm>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "internal/cloud/point_bvh.h"
 #include "internal/cloud/unmeasured.h"
 #include "internal/facade/sensor_points.h"
 #include "internal/robot/coarse_hulls.h"
+#include "ist_proximity/proximity/proximity_query.h"
 #include "obstacle_ingest.h"
 
 namespace ist {
@@ -49,6 +52,19 @@ std::shared_ptr<const CloudSnapshot> index_image(const T* xyz, std::size_t width
   RawCloud cloud = packed_cloud(copy->data(), width, height);
   cloud.owner = std::move(copy);
   return index(cloud, config);
+}
+
+void check_box(const Eigen::AlignedBox3d& box) {
+  constexpr double kFarthest = 1e9;  // [m]
+  const Eigen::Vector3d &low = box.min(), &high = box.max();
+  if ((low.array() <= high.array()).all() && low.minCoeff() > -kFarthest &&
+      high.maxCoeff() < kFarthest) {
+    return;
+  }
+  std::ostringstream text;
+  text << "a box of a map reaches from (" << low.transpose() << ") to (" << high.transpose()
+       << ") m: it is empty, or not within 10^9 m.";
+  throw std::invalid_argument(text.str());
 }
 
 }  // namespace
@@ -98,12 +114,41 @@ Obstacles Obstacles::from_image(const double* xyz, std::size_t width, std::size_
   return Obstacles(index_image(xyz, width, height, config));
 }
 
+Obstacles Obstacles::from_cloud(const RawCloud& cloud, const ObstaclesConfig& config) {
+  return Obstacles(index(cloud, config));
+}
+
+Obstacles Obstacles::from_boxes(const std::vector<Eigen::AlignedBox3d>& boxes,
+                                const Eigen::Isometry3d& X_FM) {
+  if (!is_rigid(X_FM)) throw std::invalid_argument("X_FM is not a rotation and a translation");
+  for (const Eigen::AlignedBox3d& box : boxes) check_box(box);
+  auto map = std::make_shared<BoxIndex>();
+  map->build(boxes);
+  auto snapshot = std::make_shared<CloudSnapshot>();
+  snapshot->counts.received = snapshot->counts.used = static_cast<std::uint32_t>(boxes.size());
+  snapshot->boxes = std::move(map);
+  snapshot->X_FM = X_FM;
+  return Obstacles(std::move(snapshot));
+}
+
+std::vector<std::uint32_t> Obstacles::indices() const {
+  std::vector<std::uint32_t> result;
+  result.reserve(snapshot_->index.size());
+  const PointBvh& points = snapshot_->index.bvh();
+  PointTile scratch;
+  for (std::size_t i = 0; i < points.tile_count(); ++i) {
+    const PointTile& tile = points.tile(i, &scratch);
+    result.insert(result.end(), tile.id, tile.id + tile.count);
+  }
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
 Obstacles Obstacles::from_file(const std::string& path, const ObstaclesConfig& config) {
-  const PointFile file = read_sensor_points(path);
+  PointFile file = read_sensor_points(path);
   ObstaclesConfig placed = config;
   placed.X_FS = config.X_FS * file.X_QS;
-  if (file.height <= 1) return Obstacles(file.points, placed);
-  return from_image(file.points.data()->data(), file.width, file.height, placed);
+  return from_cloud(to_cloud(std::move(file)), placed);
 }
 
 }  // namespace ist

@@ -188,7 +188,8 @@ std::string read_ascii(const Header& header, const std::array<Field, 3>& xyz, Te
                std::to_string(in->line() + 1);
       }
     }
-    file->points.emplace_back(row[xyz[0].column], row[xyz[1].column], row[xyz[2].column]);
+    const auto at = [&](const Field& field) { return field.format.nearest(row[field.column]); };
+    file->points.emplace_back(at(xyz[0]), at(xyz[1]), at(xyz[2]));
   }
   return in->only_space_left() ? "" : kMorePoints;
 }

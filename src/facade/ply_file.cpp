@@ -99,7 +99,11 @@ class NumberReader {
         is_big_endian_(encoding == "binary_big_endian") {}
 
   bool read(NumberFormat format, double* value) {
-    if (is_ascii_) return in_.number(value);
+    if (is_ascii_) {
+      const bool is_there = in_.number(value);
+      *value = format.nearest(*value);
+      return is_there;
+    }
     if (bytes_.size() - at_ < format.size) return false;
     format.is_big_endian = is_big_endian_;
     *value = format.read(bytes_.data() + at_);

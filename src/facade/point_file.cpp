@@ -1,6 +1,10 @@
 #include "point_file.h"
 
+#include <algorithm>
 #include <cctype>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include "internal/facade/sensor_points.h"
 #include "internal/geometry/limits.h"
@@ -32,6 +36,25 @@ PointFile read_sensor_points(const std::string& path) {
   }
   if (!problem.empty()) throw ModelError("point file '" + printable(path) + "' " + problem);
   return file;
+}
+
+RawCloud to_cloud(PointFile file) {
+  const auto is_exact = [](const Eigen::Vector3d& p) {
+    return (p.array() == p.cast<float>().cast<double>().array() || p.array().isNaN()).all();
+  };
+  RawCloud cloud;
+  if (std::all_of(file.points.begin(), file.points.end(), is_exact)) {
+    auto points = std::make_shared<std::vector<Eigen::Vector3f>>();
+    points->reserve(file.points.size());
+    for (const Eigen::Vector3d& p : file.points) points->push_back(p.cast<float>());
+    cloud = packed_cloud(reinterpret_cast<const float*>(points->data()), file.width, file.height);
+    cloud.owner = std::move(points);
+  } else {
+    auto points = std::make_shared<std::vector<Eigen::Vector3d>>(std::move(file.points));
+    cloud = packed_cloud(reinterpret_cast<const double*>(points->data()), file.width, file.height);
+    cloud.owner = std::move(points);
+  }
+  return cloud;
 }
 
 PointFile read_points(const std::string& path) {

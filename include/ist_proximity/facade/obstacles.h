@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <string>
@@ -15,6 +16,7 @@
 namespace ist {
 
 class Robot;
+struct RawCloud;
 
 /// The choice of the points that become obstacles.
 struct ObstaclesConfig {
@@ -54,6 +56,18 @@ class Obstacles {
   static Obstacles from_image(const double* xyz, std::size_t width, std::size_t height,
                               const ObstaclesConfig& config = {});
 
+  /// Points where they lie in memory, with any layout: a view of a message or of another library's
+  /// cloud (check_layout, packed_cloud, pcl.h). Nothing is copied. With RawCloud::owner the points
+  /// of an image are read when a query first needs them; without, all are read now.
+  static Obstacles from_cloud(const RawCloud& cloud, const ObstaclesConfig& config = {});
+
+  /// Solid boxes of a map [m], axis-aligned in its frame M; they may overlap or touch.
+  /// @param X_FM  frame M -> fixed frame, rigid
+  /// @throws std::invalid_argument when a box is empty, a coordinate is not finite or not below
+  ///         10^9 m, or X_FM is not rigid
+  static Obstacles from_boxes(const std::vector<Eigen::AlignedBox3d>& boxes,
+                              const Eigen::Isometry3d& X_FM = Eigen::Isometry3d::Identity());
+
   /// The points of a PCD or PLY file, by its extension (read_points). X_FS is its frame Q -> fixed
   /// frame; ranges count from its sensor.
   /// @throws ModelError when the file cannot be read
@@ -62,6 +76,8 @@ class Obstacles {
   std::size_t size() const { return snapshot_->counts.used; }  ///< points used
   /// Numbers of points by what was done with them.
   const IngestCounts& counts() const { return snapshot_->counts; }
+  /// The numbers of the points used, ascending: in the list, or in the image row by row.
+  std::vector<std::uint32_t> indices() const;
   const CloudSnapshot& snapshot() const { return *snapshot_; }  ///< what queries take
 
  private:
