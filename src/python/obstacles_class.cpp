@@ -1,7 +1,9 @@
 #include "obstacles_class.h"
 
-#include <algorithm>
+#include <cstdint>
 #include <limits>
+#include <memory>
+#include <string>
 #include <utility>
 
 #include "arrays.h"
@@ -19,7 +21,8 @@ constexpr const char* kDoc =
 array says that there are no obstacles.
 
 points: (n, 3) [m], a list; or (h, w, 3), an image with nan where nothing was measured, which is
-  indexed several times faster; or the path of a PCD or PLY file. float32 stays float32.
+  indexed several times faster; whatever numpy takes for such an array (lists, open3d's .points); a
+  sensor_msgs/PointCloud2 (of rospy or of a bag); or the path of a PCD or PLY file. float32 stays float32.
 sensor_pose: (4, 4), frame of the points -> root link's frame; None: they are in that frame. Of a PCD
   file with a VIEWPOINT: the frame that this is stated in.
 min_range, max_range: [m] points nearer to or farther from the origin of their frame (of a PCD file:
@@ -46,57 +49,101 @@ Eigen::Isometry3d to_pose(const DoubleArray& X) {
   return pose;
 }
 
-/// Views a C-contiguous array.
+/// Views an array of float32 or float64 that nobody changes. Its last reader may be any thread.
 template <class T>
-PointArray view(const py::array& given) {
-  auto points = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(given);
-  if (!points) throw py::error_already_set();
-  const bool is_list = points.ndim() == 2 && points.shape(1) == 3;
-  if (!is_list && !(points.ndim() == 3 && points.shape(2) == 3)) {
-    throw py::value_error("points have the shape (n, 3) or (h, w, 3); an array of shape " +
-                          to_string(points) + " was given");
-  }
-  const auto height = is_list ? 1 : static_cast<std::size_t>(points.shape(0));
-  const auto width = static_cast<std::size_t>(points.shape(is_list ? 0 : 1));
+PointArray view_as(const py::array_t<T>& points) {
+  const bool is_list = points.ndim() == 2;
   PointArray result;
-  result.cloud = packed_cloud(points.data(), width, height);
-  result.array = std::move(points);
+  result.cloud =
+      packed_cloud(points.data(), static_cast<std::size_t>(points.shape(is_list ? 0 : 1)),
+                   is_list ? 1 : static_cast<std::size_t>(points.shape(0)));
+  PyObject* const kept = points.inc_ref().ptr();
+  result.cloud.owner = std::shared_ptr<const void>(kept, [kept](const void*) {
+    const py::gil_scoped_acquire locked;
+    Py_DECREF(kept);
+  });
+  result.array = points;
   return result;
 }
 
-PointArray read(const py::object& points) {
-  if (is_path(points)) {
-    const std::string path = to_path(points);
-    PointArray result;
+PointArray view(const py::object& points) {
+  if (py::isinstance<py::array_t<float>>(points)) return view_as<float>(points);
+  return view_as<double>(points);
+}
+
+/// An array of its own: x, y and z of a sensor_msgs/PointCloud2.
+py::array array_of_message(const py::object& message) {
+  CloudLayout layout;
+  for (const py::handle& field : message.attr("fields")) {
+    layout.fields.push_back({py::cast<std::string>(field.attr("name")),
+                             py::cast<std::uint32_t>(field.attr("offset")),
+                             py::cast<std::uint8_t>(field.attr("datatype")),
+                             py::cast<std::uint32_t>(field.attr("count"))});
+  }
+  layout.width = py::cast<std::uint32_t>(message.attr("width"));
+  layout.height = py::cast<std::uint32_t>(message.attr("height"));
+  layout.point_step = py::cast<std::uint32_t>(message.attr("point_step"));
+  layout.row_step = py::cast<std::uint32_t>(message.attr("row_step"));
+  layout.is_bigendian = py::cast<bool>(py::bool_(message.attr("is_bigendian")));
+  const py::object bytes = message.attr("data");
+  const py::buffer_info data = py::buffer(bytes).request();
+  layout.data = static_cast<const std::uint8_t*>(data.ptr);
+  layout.data_size = static_cast<std::size_t>(data.size * data.itemsize);
+  RawCloud cloud;
+  const std::string fault = check_layout(layout, &cloud);
+  if (!fault.empty()) throw py::value_error("malformed cloud: " + fault);
+  const py::module_ numpy = py::module_::import("numpy");
+  if (cloud.size() == 0) return numpy.attr("zeros")(py::make_tuple(0, 3));
+  const std::string type =
+      std::string(layout.is_bigendian ? ">" : "<") + (cloud.is_double ? "f8" : "f4");
+  py::list coordinates;
+  for (const std::size_t offset : {cloud.x, cloud.y, cloud.z}) {
+    coordinates.append(numpy.attr("ndarray")(py::make_tuple(cloud.height, cloud.width), type, bytes,
+                                             offset,
+                                             py::make_tuple(cloud.row_step, cloud.point_step)));
+  }
+  const py::array image = numpy.attr("stack")(coordinates, 2);
+  return cloud.height == 1 ? py::array(image[py::int_(0)]) : image;
+}
+
+/// An array of its own: the points of a file.
+/// @param X_QS  receives the pose of their sensor
+py::array array_of_file(const std::string& path, Eigen::Isometry3d* X_QS) {
+  RawCloud cloud;
+  {
     const py::gil_scoped_release unlocked;
-    result.file = read_sensor_points(path);
-    const double* data = result.file.points.empty() ? nullptr : result.file.points.data()->data();
-    result.cloud = packed_cloud(data, result.file.width, result.file.height);
-    return result;
+    PointFile file = read_sensor_points(path);
+    *X_QS = file.X_QS;
+    cloud = to_cloud(std::move(file));
   }
-  const py::array array = py::array::ensure(points);
-  if (!array ||
-      (array.dtype().kind() != 'f' && array.dtype().kind() != 'i' && array.dtype().kind() != 'u')) {
+  const auto width = static_cast<py::ssize_t>(cloud.width),
+             height = static_cast<py::ssize_t>(cloud.height);
+  const Shape shape = height == 1 ? Shape{width, 3} : Shape{height, width, 3};
+  const py::dtype type = cloud.is_double ? py::dtype::of<double>() : py::dtype::of<float>();
+  return py::array(type, shape, cloud.data);
+}
+
+/// An array of float32 or float64 of its own, of whatever Obstacles takes.
+py::array to_array(const py::object& points, Eigen::Isometry3d* X_QS) {
+  if (is_path(points)) return array_of_file(to_path(points), X_QS);
+  const bool is_message = py::hasattr(points, "fields") && py::hasattr(points, "point_step");
+  const py::array given = is_message ? array_of_message(points) : py::array::ensure(points);
+  const char kind = given ? given.dtype().kind() : '?';
+  if (kind != 'f' && kind != 'i' && kind != 'u') {
     PyErr_Clear();
-    throw py::type_error("points are an array of numbers of shape (n, 3) or (h, w, 3), or a path");
+    throw py::type_error(
+        "points are an array of numbers of shape (n, 3) or (h, w, 3), a sensor_msgs/PointCloud2, "
+        "or a path");
   }
-  if (array.dtype().kind() == 'f' && array.itemsize() == sizeof(float)) return view<float>(array);
-  return view<double>(array);
-}
-
-template <class T>
-Obstacles index_as(const RawCloud& cloud, const ObstaclesConfig& config) {
-  using Vector = Eigen::Matrix<T, 3, 1>;
-  const auto* data = reinterpret_cast<const T*>(cloud.data);
-  if (cloud.height != 1) return Obstacles::from_image(data, cloud.width, cloud.height, config);
-  return Obstacles(Span<const Vector>(reinterpret_cast<const Vector*>(data), cloud.width), config);
-}
-
-/// Indexes points without holding the GIL.
-Obstacles index(const PointArray& points, const ObstaclesConfig& config) {
-  const py::gil_scoped_release unlocked;
-  return points.cloud.is_double ? index_as<double>(points.cloud, config)
-                                : index_as<float>(points.cloud, config);
+  const py::ssize_t dimensions = given.ndim();
+  if (dimensions < 2 || dimensions > 3 || given.shape(dimensions - 1) != 3) {
+    throw py::value_error("points have the shape (n, 3) or (h, w, 3); an array of shape " +
+                          to_string(given) + " was given");
+  }
+  const bool is_float = kind == 'f' && given.itemsize() == sizeof(float);
+  return py::module_::import("numpy").attr("array")(
+      given, is_float ? py::dtype::of<float>() : py::dtype::of<double>(), py::arg("order") = "C",
+      py::arg("subok") = false);
 }
 
 ObstaclesConfig config_of(const py::dict& arguments) {
@@ -120,15 +167,6 @@ ObstaclesConfig config_of(const py::dict& arguments) {
 }
 
 /// A copy that nobody else changes.
-py::object owned(const PointArray& points) {
-  if (points.array) return points.array.attr("copy")();
-  const std::vector<Eigen::Vector3d>& list = points.file.points;
-  const auto width = static_cast<py::ssize_t>(points.file.width),
-             height = static_cast<py::ssize_t>(points.file.height);
-  DoubleArray copy(height == 1 ? Shape{width, 3} : Shape{height, width, 3});
-  if (!list.empty()) std::copy_n(list.data()->data(), copy.size(), copy.mutable_data());
-  return std::move(copy);
-}
 py::object owned(const py::object& array) {
   return array.is_none() ? array : py::module_::import("numpy").attr("array")(array);
 }
@@ -144,19 +182,25 @@ PyObstacles make(const py::object& points, const py::object& sensor_pose, double
   arguments["q"] = owned(q);
   arguments["self_filter_padding"] = self_filter_padding;
   arguments["extent"] = extent;
-  const PointArray array = read(points);
-  if (!array.file.X_QS.matrix().isIdentity(0.0)) {  // the file says where its sensor was
-    const Eigen::Matrix4d X_FS = (config_of(arguments).X_FS * array.file.X_QS).matrix();
+  Eigen::Isometry3d X_QS = Eigen::Isometry3d::Identity();
+  const PointArray array = view(to_array(points, &X_QS));
+  if (!X_QS.matrix().isIdentity(0.0)) {  // the file says where its sensor was
+    const Eigen::Matrix4d X_FS = (config_of(arguments).X_FS * X_QS).matrix();
     arguments["sensor_pose"] = make_array<double>({4, 4}, [&](std::size_t k) {
       return X_FS(static_cast<Eigen::Index>(k / 4), static_cast<Eigen::Index>(k % 4));
     });
   }
-  return {index(array, config_of(arguments)), owned(array), arguments};
+  const ObstaclesConfig config = config_of(arguments);
+  const Obstacles obstacles = [&] {
+    const py::gil_scoped_release unlocked;
+    return Obstacles::from_cloud(array.cloud, config);
+  }();
+  return {obstacles, array.array, arguments};
 }
 
 }  // namespace
 
-PointArray read_again(const PyObstacles& obstacles) { return read(obstacles.points); }
+PointArray read_again(const PyObstacles& obstacles) { return view(obstacles.points); }
 
 ObstaclesConfig config_of(const PyObstacles& obstacles) { return config_of(obstacles.arguments); }
 

@@ -16,9 +16,8 @@ struct PyObstacles {
 
 /// Points in memory, which stay as they are as long as this lives.
 struct PointArray {
-  pybind11::object array;  ///< keeps the points of an array
-  PointFile file;          ///< keeps the points of a file
-  RawCloud cloud;          ///< views them
+  pybind11::object array;  ///< (n, 3) or (h, w, 3), of float32 or float64
+  RawCloud cloud;          ///< views them, and keeps the array
 };
 
 /// The points that an Obstacles object was made of.

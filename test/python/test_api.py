@@ -6,6 +6,7 @@ import pathlib
 import pickle
 import threading
 import time
+import types
 
 import numpy as np
 import pytest
@@ -277,6 +278,59 @@ def test_the_interpreter_runs_during_queries(robot):
         turns += 1
     thread.join()
     assert turns > 5
+
+
+def cloud_message(points, number='<f4', **changes):
+    """A sensor_msgs/PointCloud2 of (height, width, 3), with a field before each point."""
+    height, width, _ = points.shape
+    rows = np.zeros((height, width), np.dtype([('ring', 'u2'), ('xyz', number, 3), ('spare', 'u1', 2)]))
+    rows['xyz'] = points
+    size = np.dtype(number).itemsize
+    fields = [types.SimpleNamespace(name='ring', offset=0, datatype=4, count=1)]
+    fields += [types.SimpleNamespace(name=name, offset=2 + k * size, datatype=7 if size == 4 else 8, count=1)
+               for k, name in enumerate('xyz')]
+    step = rows.dtype.itemsize
+    message = types.SimpleNamespace(fields=fields, width=width, height=height, point_step=step,
+                                    row_step=width * step, is_bigendian=number[0] == '>',
+                                    data=rows.tobytes(), is_dense=False)
+    vars(message).update(changes)
+    return message
+
+
+def test_points_of_other_libraries(robot):
+    """The same points give the same distances, whatever they come in."""
+    rng = np.random.default_rng(7)
+    image = rng.uniform(-1.0, 1.0, (30, 40, 3)).astype('f4')
+    image[::7, ::5] = np.nan
+    q = np.zeros(len(robot.joints))
+    expected = robot.distances(q, ist.Obstacles(image), tolerance=0.0).distance
+    points = image.reshape(-1, 3)
+
+    class Converts:  # pylint: disable=too-few-public-methods
+        """What only numpy can convert, as open3d's .points."""
+        def __array__(self, dtype=None, **_):
+            return points.astype(dtype or 'f8')
+    for same in [points, points[::-1], points.tolist(), image.astype('f8'), np.asfortranarray(image),
+                 image.astype('>f4'), Converts(), cloud_message(image), cloud_message(image, '>f4'),
+                 cloud_message(image, '<f8'), cloud_message(points[None])]:
+        obstacles = ist.Obstacles(same)
+        assert np.array_equal(robot.distances(q, obstacles, tolerance=0.0).distance, expected)
+        again = pickle.loads(pickle.dumps(obstacles))
+        assert np.array_equal(robot.distances(q, again, tolerance=0.0).distance, expected)
+    assert len(ist.Obstacles(cloud_message(np.zeros((0, 0, 3), 'f4')))) == 0
+    for wrong, message in [({'data': b''}, 'data holds'), ({'fields': []}, "'x'"), ({'row_step': 3}, 'row_step')]:
+        with pytest.raises(ValueError, match=message):
+            ist.Obstacles(cloud_message(image, **wrong))
+
+
+def test_points_are_copied(robot):
+    """Whatever becomes of an array, obstacles stay as they were made."""
+    image = np.full((20, 20, 3), [0.6, 0.0, 0.5], 'f4') + np.random.default_rng(1).normal(0, 0.1, (20, 20, 3))
+    q = np.zeros(len(robot.joints))
+    expected = robot.distances(q, ist.Obstacles(image.copy()), tolerance=0.0).distance
+    obstacles = ist.Obstacles(image)
+    image[:] = 50.0
+    assert np.array_equal(robot.distances(q, obstacles, tolerance=0.0).distance, expected)
 
 
 @pytest.mark.parametrize('points, message', [

@@ -15,7 +15,7 @@ class SceneError(Exception):
 class Scene:
     """Points, where they were seen from, and the joints at that instant."""
 
-    points: object  # a path that Obstacles reads, or an array (n, 3) or (h, w, 3) [m]
+    points: object  # what Obstacles takes: a path, or a message
     sensor_pose: np.ndarray  # (4, 4), frame of the points -> root link's frame
     positions: dict  # joint positions [rad, m] by name; empty: not known
     origin: str  # where it comes from, for the reader
@@ -46,26 +46,6 @@ def load(path, root_link, topic=None, sensor_pose=None):
         return _load_bag(path, root_link, topic, sensor_pose)
     X = np.eye(4) if sensor_pose is None else pose(sensor_pose)
     return Scene(str(path), X, {}, path.name)
-
-
-def to_array(message):
-    """The points of a sensor_msgs/PointCloud2: (height, width, 3)."""
-    fields = {field.name: field for field in message.fields}
-    missing = [name for name in 'xyz' if name not in fields]
-    if missing:
-        raise SceneError(f'the cloud has no field {missing[0]}')
-    formats = []
-    for name in 'xyz':
-        if fields[name].datatype not in (7, 8):
-            raise SceneError(f'field {name} of the cloud is not float32 or float64')
-        order = '>' if message.is_bigendian else '<'
-        formats.append(order + ('f4' if fields[name].datatype == 7 else 'f8'))
-    point = np.dtype({'names': list('xyz'), 'formats': formats,
-                      'offsets': [fields[name].offset for name in 'xyz'],
-                      'itemsize': message.point_step})
-    rows = np.ndarray((message.height, message.width), point, message.data,
-                      strides=(message.row_step, message.point_step))
-    return np.stack([rows[name].astype(formats[0][1:]) for name in 'xyz'], axis=2)
 
 
 def _clouds(bag, topic):
@@ -103,10 +83,8 @@ def _load_bag(path, root_link, topic, sensor_pose):
         X = pose(sensor_pose) if sensor_pose is not None else _transform(
             bag, tf2_py, root_link, cloud.header)
         positions = _joint_positions(bag, cloud.header.stamp)
-    image = to_array(cloud)
-    points = image if cloud.height > 1 else image[0]
     origin = f'{path.name}, {topic}, message {count // 2 + 1} of {count}'
-    return Scene(points, X, positions, origin)
+    return Scene(cloud, X, positions, origin)
 
 
 def _transform(bag, tf2_py, root_link, header):
