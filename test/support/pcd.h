@@ -4,11 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/facade/obstacles.h"
+
 namespace ist::test {
 
-/// Reads x, y, z of a binary_compressed PCD file whose fields are all four bytes wide, in file
-/// order. Pixels without a measurement are NaN.
-/// @throws std::runtime_error
-std::vector<Eigen::Vector3f> read_pcd(const std::string& path);
+/// The points of a PCD file in float32, in file order.
+inline std::vector<Eigen::Vector3f> read_pcd(const std::string& path) {
+  std::vector<Eigen::Vector3f> points;
+  for (const Eigen::Vector3d& p : read_points(path).points) points.push_back(p.cast<float>());
+  return points;
+}
 
 }  // namespace ist::test

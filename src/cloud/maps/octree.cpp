@@ -6,7 +6,7 @@
 #include <sstream>
 #include <utility>
 
-#include "cloud/maps/map_file.h"
+#include "internal/geometry/regular_file.h"
 
 namespace ist {
 namespace {
@@ -204,8 +204,8 @@ std::string read_octree_file(const std::string& path, Octree* octree, const Octr
                              double* resolution) {
   const std::string name = "map file '" + path + "' ";
   std::string bytes;
-  std::string fault = read_map_bytes(path, limits.max_bytes, &bytes);
-  if (!fault.empty()) return name + fault;
+  std::string fault = read_regular_file(path, limits.max_bytes, &bytes);
+  if (!fault.empty()) return name + "cannot be read: it " + fault + ".";
   Header header;
   std::size_t data_begin = 0;
   fault = read_header(bytes, &header, &data_begin);
