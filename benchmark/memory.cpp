@@ -26,6 +26,11 @@
 
 #ifdef IST_PROXIMITY_HAS_OCTOMAP
 #include <octomap/octomap.h>
+
+#include <memory>
+#include <sstream>
+
+#include "ist_proximity/octomap.h"
 #endif
 
 namespace {
@@ -40,6 +45,7 @@ constexpr int kPeerEvery = 10;        // liboctomap takes one cloud of so many
 struct Times {
   std::vector<double> ingest, scan, insert, boxes;  // [us] of a cloud
   std::vector<double> octomap, octomap_discrete;    // [us] of the same
+  std::vector<double> message, octomap_message;     // [us] of the map as a message
   std::vector<double> query, query_with;            // [us]
 };
 
@@ -68,6 +74,31 @@ double insert_octomap(const ist::MemoryScan& scan, bool discretize, octomap::OcT
                          false, discretize);
   return timer.lap();
 }
+
+// Writes the map as octomap's message by way of a tree: what it holds has to get there first.
+double write_octomap(const ist::MemoryMap& map, const octomap::OcTree& known, std::size_t* size) {
+  std::stringstream stream;
+  ThreadTimer timer;
+  octomap::OcTree tree(kResolution);
+  for (auto leaf = known.begin_leafs(); leaf != known.end_leafs(); ++leaf) {
+    const octomap::point3d p = leaf.getCoordinate();
+    tree.setNodeValue(leaf.getKey(), map.log_odds({p.x(), p.y(), p.z()}), true);
+  }
+  tree.updateInnerOccupancy();
+  tree.toMaxLikelihood();
+  tree.prune();
+  tree.writeBinaryData(stream);
+  const double us = timer.lap();
+  *size = stream.str().size();
+  return us;
+}
+
+// The voxels that the map knows, each a leaf.
+std::unique_ptr<octomap::OcTree> known_voxels(const ist::MemoryMap& map) {
+  auto tree = ist::to_octree(map);
+  tree->expand();
+  return tree;
+}
 #endif
 
 std::string line(const char* format, double a, double b) {
@@ -89,6 +120,8 @@ std::string table(const Times& t) {
   text += row("memory: boxes of what is hidden, and their index", t.boxes);
   text += row("liboctomap, as octomap_server", t.octomap);
   text += row("liboctomap, discretized", t.octomap_discrete);
+  text += row("memory: as octomap's message", t.message);
+  text += row("liboctomap: the same, by way of its tree", t.octomap_message);
   text += row("query of all links, without memory", t.query);
   text += row("query of all links, with memory", t.query_with);
   const double ours = quantile(t.scan, 0.5) + quantile(t.insert, 0.5) + quantile(t.boxes, 0.5);
@@ -144,6 +177,7 @@ int main(int argc, char** argv) {
 #ifdef IST_PROXIMITY_HAS_OCTOMAP
   octomap::OcTree tree(kResolution), discrete_tree(kResolution);
 #endif
+  std::size_t message_size = 0, octomap_message_size = 0;  // [bytes]
   ist::CloudSnapshot cloud, memory;
   ist::MemoryScan scan;
   ist::VoxelBoxes boxes;
@@ -174,6 +208,11 @@ int main(int argc, char** argv) {
 #ifdef IST_PROXIMITY_HAS_OCTOMAP
       times.octomap.push_back(insert_octomap(scan, false, &tree));
       times.octomap_discrete.push_back(insert_octomap(scan, true, &discrete_tree));
+      const auto voxels = known_voxels(map);
+      timer.lap();
+      message_size = map.octree_bytes().size();
+      times.message.push_back(timer.lap());
+      times.octomap_message.push_back(write_octomap(map, *voxels, &octomap_message_size));
 #endif
     }
     if (frames > 0 && step % 2 == 0) {
@@ -198,6 +237,7 @@ int main(int argc, char** argv) {
               scan.free_ends.size());
   std::printf("%zu voxels known, %zu occupied, %zu in memory, %zu boxes hidden\n", counts.known,
               counts.occupied, counts.nodes, boxes.size());
+  std::printf("message: %zu bytes, liboctomap's: %zu\n", message_size, octomap_message_size);
   if (argc <= 2) return 0;
   return ist::benchmark::write_table(argv[2], "memory cost", text) ? 0 : 1;
 }

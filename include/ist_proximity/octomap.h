@@ -1,10 +1,10 @@
 #pragma once
 
-/// Maps of OctoMap as obstacles, and a memory as a map of OctoMap. Header only: a program that
-/// includes it links octomap; this library needs none.
-///
-///     const auto obstacles = ist::to_obstacles(octree);  // an OcTree, a ColorOcTree
-///     const auto answers = robot.distances(q, obstacles);
+// Maps of OctoMap as obstacles, and a memory as a map of OctoMap. Header only: a program that
+// includes it links octomap; this library needs none.
+//
+//     const auto obstacles = ist::to_obstacles(octree);  // an OcTree, a ColorOcTree
+//     const auto answers = robot.distances(q, obstacles);
 
 #include <octomap/OcTree.h>
 #include <octomap/OccupancyOcTreeBase.h>

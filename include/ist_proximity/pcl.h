@@ -1,11 +1,11 @@
 #pragma once
 
-/// Clouds of PCL as obstacles, where they lie in memory, and results as clouds of PCL. Header only:
-/// a program that includes it links pcl_common; this library needs no PCL.
-///
-///     const auto obstacles = ist::to_obstacles(cloud);  // a pcl::PointCloud, or a pointer to one
-///     const auto answers = robot.distances(q, obstacles);
-///     pcl::io::savePCDFileBinary("witnesses.pcd", ist::witness_points(answers));
+// Clouds of PCL as obstacles, where they lie in memory, and results as clouds of PCL. Header only:
+// a program that includes it links pcl_common; this library needs no PCL.
+//
+//     const auto obstacles = ist::to_obstacles(cloud);  // a pcl::PointCloud, or a pointer to one
+//     const auto answers = robot.distances(q, obstacles);
+//     pcl::io::savePCDFileBinary("witnesses.pcd", ist::witness_points(answers));
 
 #include <pcl/PCLPointCloud2.h>
 #include <pcl/point_cloud.h>
