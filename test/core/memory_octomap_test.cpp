@@ -10,6 +10,7 @@
 
 #include "cloud/memory/voxel_ray.h"
 #include "ist_proximity/cloud/memory_map.h"
+#include "ist_proximity/octomap.h"
 #include "support/scene.h"
 #include "support/temp_dir.h"
 
@@ -132,6 +133,8 @@ TEST(MemoryOctomap, FilesAreReadByEachOther) {
     }
     EXPECT_EQ(different, 0U);
     EXPECT_EQ(voxels, map.counts().known);
+    EXPECT_TRUE(*to_octree(map) == tree);
+    EXPECT_EQ(to_octree(MemoryMap(map.config()))->size(), 0U);
 
     // And back, as octomap writes it.
     const std::string again = (folder.path() / "again.bt").string();

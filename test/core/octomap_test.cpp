@@ -1,21 +1,21 @@
-// Maps of OctoMap as obstacles, and a memory as a map of OctoMap.
+// Maps of OctoMap as obstacles. octree_test has those of messages and files, memory_octomap_test
+// a memory as a map.
 #include "ist_proximity/octomap.h"
 
 #include <gtest/gtest.h>
 #include <octomap/ColorOcTree.h>
-#include <octomap/octomap.h>
+#include <octomap/OcTree.h>
 
 #include <algorithm>
 #include <functional>
-#include <sstream>
+#include <iterator>
+#include <limits>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "ist_proximity/facade/robot.h"
 #include "support/errors.h"
 #include "support/scene.h"
-#include "support/temp_dir.h"
 
 namespace ist {
 namespace {
@@ -42,27 +42,12 @@ Tree random_tree(double resolution, int points) {
   return tree;
 }
 
-Boxes sorted(Boxes boxes) {
-  std::sort(boxes.begin(), boxes.end(), [](const auto& a, const auto& b) {
-    return std::make_tuple(a.min().x(), a.min().y(), a.min().z()) <
-           std::make_tuple(b.min().x(), b.min().y(), b.min().z());
-  });
-  return boxes;
-}
-
 void expect_equal(const Boxes& a, const Boxes& b) {
   ASSERT_EQ(a.size(), b.size());
-  const Boxes left = sorted(a), right = sorted(b);
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    EXPECT_EQ(left[i].min(), right[i].min());
-    EXPECT_EQ(left[i].max(), right[i].max());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].min(), b[i].min());
+    EXPECT_EQ(a[i].max(), b[i].max());
   }
-}
-
-double volume(const Boxes& boxes) {
-  double sum = 0.0;
-  for (const Eigen::AlignedBox3d& box : boxes) sum += box.volume();
-  return sum;
 }
 
 double distance(const Obstacles& obstacles) {
@@ -81,35 +66,6 @@ std::string error_of(const std::function<void()>& call) {
     return error.what();
   }
   return "(no error)";
-}
-
-// A tree, its message and its files are the same obstacles, to the bit.
-TEST(Octomap, ATreeIsWhatItsMessageAndFilesAre) {
-  auto tree = random_tree<octomap::OcTree>(0.05, 500);
-  const Boxes boxes = occupied_boxes(tree);
-  std::stringstream stream;
-  ASSERT_TRUE(tree.writeData(stream));
-  const std::string bytes = stream.str();
-  OctreeData message;
-  message.id = tree.getTreeType();
-  message.resolution = tree.getResolution();
-  message.data = reinterpret_cast<const std::uint8_t*>(bytes.data());
-  message.size = bytes.size();
-  Octree read;
-  ASSERT_EQ(read_octree(message, &read), "");
-  expect_equal(read.occupied, boxes);
-  EXPECT_GT(boxes.size(), 300U);
-  EXPECT_EQ(distance(to_obstacles(tree)), distance(Obstacles::from_boxes(read.occupied)));
-
-  const test::TempDir folder;
-  ASSERT_TRUE(tree.write(folder.file("map.ot")));
-  ASSERT_EQ(read_octree_file(folder.file("map.ot"), &read), "");
-  expect_equal(read.occupied, boxes);
-  ASSERT_TRUE(tree.writeBinary(folder.file("map.bt")));  // which makes leaves free or occupied
-  ASSERT_EQ(read_octree_file(folder.file("map.bt"), &read), "");
-  expect_equal(read.occupied, occupied_boxes(tree));
-  EXPECT_NEAR(volume(read.occupied), volume(boxes), 1e-9);
-  EXPECT_EQ(distance(to_obstacles(tree)), distance(Obstacles::from_boxes(read.occupied)));
 }
 
 TEST(Octomap, ATreeOfColoursIsRead) {
@@ -171,29 +127,6 @@ TEST(Octomap, WhatCannotBeUsedIsSaid) {
   test::expect_says(error_of([&] { occupied_boxes(tree, selection); }), "max_depth is 17");
   const Eigen::AlignedBox3d none;
   test::expect_says(error_of([&] { Obstacles::from_boxes({none}); }), "it is empty");
-}
-
-TEST(Octomap, AMemoryIsATree) {
-  test::Rng rng(5);
-  MemoryConfig config;
-  config.resolution = 0.05;
-  MemoryMap memory(config);
-  EXPECT_EQ(to_octree(memory)->size(), 0U);
-  MemoryScan scan;
-  for (int i = 0; i < 200; ++i) scan.hits.push_back(test::random_vector(&rng, 1.0).cast<float>());
-  memory.insert(scan);
-  const std::unique_ptr<octomap::OcTree> tree = to_octree(memory);
-  VoxelBoxes occupied;
-  memory.occupied_boxes(&occupied);
-  EXPECT_NEAR(volume(occupied_boxes(*tree)), volume(occupied), 1e-9);
-  std::size_t known = 0;
-  for (auto leaf = tree->begin_leafs(); leaf != tree->end_leafs(); ++leaf) {
-    const octomap::point3d p = leaf.getCoordinate();
-    known += std::size_t{1} << (3 * (16 - leaf.getDepth()));
-    EXPECT_EQ(memory.state({p.x(), p.y(), p.z()}),
-              tree->isNodeOccupied(*leaf) ? VoxelState::kOccupied : VoxelState::kFree);
-  }
-  EXPECT_EQ(known, memory.counts().known);
 }
 
 }  // namespace

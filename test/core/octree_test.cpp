@@ -14,6 +14,7 @@
 #include <tuple>
 #include <vector>
 
+#include "ist_proximity/octomap.h"
 #include "support/errors.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
@@ -69,6 +70,13 @@ void expect_same(const Octree& octree, const octomap::OcTree& tree) {
     ASSERT_NEAR(std::get<1>(found[i]), std::get<1>(truth[i]), 1e-6);
     ASSERT_NEAR(std::get<2>(found[i]), std::get<2>(truth[i]), 1e-6);
     ASSERT_NEAR(std::get<3>(found[i]), std::get<3>(truth[i]), 1e-9);
+  }
+  // The tree itself is the same obstacles, in the same order, to the bit.
+  const std::vector<Eigen::AlignedBox3d> boxes = occupied_boxes(tree);
+  ASSERT_EQ(boxes.size(), octree.occupied.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    ASSERT_EQ(boxes[i].min(), octree.occupied[i].min());
+    ASSERT_EQ(boxes[i].max(), octree.occupied[i].max());
   }
 }
 
