@@ -85,7 +85,6 @@ double opening_margin_of(const SurfaceBvh& surface, const SurfaceBvh& cells,
   return margin;
 }
 
-// Around everything whose distance is kept from pose to pose.
 Eigen::AlignedBox3d box_of(const LinkModel& link, const SurfaceBvh& surface,
                            const SurfaceBvh& cells) {
   Eigen::AlignedBox3d box = bounding_box(link);
@@ -104,7 +103,8 @@ LinkSurface::LinkSurface(const LinkModel& link, const CancelRequest& cancelled)
       opening_cells(openings.cells(), cancelled),
       opening_margin(opening_margin_of(surface, opening_cells, cancelled)),
       component_points(points_of_components(surface, cancelled)),
-      displacement(box_of(link, surface, opening_cells)),
+      box(box_of(link, surface, opening_cells)),
+      displacement(box),
       depth_limit(depth_limit_of(link, surface)) {}
 
 std::shared_ptr<const LinkSurface> LinkSurface::of(const LinkModel& link,

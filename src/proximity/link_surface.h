@@ -33,7 +33,10 @@ struct LinkSurface {
   /// One point of each connected component of the surface: where surfaces are apart, all of a
   /// component is inside another link, or nothing of it.
   std::vector<Eigen::Vector3d> component_points;
-  DisplacementBound displacement;
+  /// [m] About everything that belongs to the link in contact and apart: its surface, what it
+  /// encloses, and the openings of its holes.
+  Eigen::AlignedBox3d box;
+  DisplacementBound displacement;  ///< of that box
   /// [m] No point inside the link is farther from its surface.
   double depth_limit = 0.0;
 };

@@ -15,17 +15,17 @@ namespace ist {
 /// speeds: the motion bound of conservative advancement.
 ///
 /// A joint that turns at |dq_k| moves a point at |dq_k| times its distance from the joint's axis,
-/// at most the largest distance within the bounding sphere. Joints nearer to the body change that
-/// distance no faster than they move the sphere's centre. So after h seconds no point has moved
-/// farther than a h + b h^2 / 2, with a the speed at the start and b the growth of that speed.
+/// at most the largest distance within the bounding sphere. It makes no difference to where a point
+/// ends whether the joints move together or one after the other, from the root on: then each one
+/// finds its axis and the point as far apart as they were at the start. So after h seconds no point
+/// is farther from where it was than a h, with a the speed at the start.
 class MotionBound {
  public:
   /// @param motion          after place_mimics()
   /// @param center, radius  [m] the body's bounding sphere, in the body's frame
   /// @param ancestor  a body that this one hangs on: the motion is that in its frame
-  MotionBound(const Kinematics& kinematics, const JointMotion& motion, const JointPoses& still,
-              std::size_t body, const Eigen::Vector3d& center, double radius,
-              std::size_t ancestor = 0);
+  MotionBound(const Kinematics& kinematics, const JointMotion& motion, std::size_t body,
+              const Eigen::Vector3d& center, double radius, std::size_t ancestor = 0);
 
   /// The time [s] during which no point of the body moves farther than `distance` [m]; +inf when
   /// the body stands still.
@@ -34,27 +34,24 @@ class MotionBound {
 
   /// [m/s] a: no point of the body is faster now. @param X_FB  by body, now
   double speed(Span<const Eigen::Isometry3d> X_FB) const;
-  double growth() const { return growth_; }  ///< [m/s^2] b
 
  private:
   struct Mover {
     std::size_t child;     ///< body
-    bool turns;            ///< false: the joint slides
     Eigen::Vector3d axis;  ///< unit, in the child body's frame
-    double speed;          ///< [rad/s, m/s] >= 0
+    double speed;          ///< [rad/s] > 0
   };
 
   std::size_t body_;
   Eigen::Vector3d center_;
   double radius_;
-  std::vector<Mover> movers_;
+  std::vector<Mover> movers_;   ///< joints that turn
   double sliding_speed_ = 0.0;  ///< [m/s] sum over the prismatic joints
-  double growth_ = 0.0;         ///< [m/s^2] b
 };
 
-/// The time [s] until speed h + growth h^2 / 2 is `distance` [m], a little less to allow for
-/// rounding; +inf for a speed of 0.
-double time_within(double distance, double speed, double growth);
+/// The time [s] that a distance [m] takes, a little less to allow for rounding; +inf for a speed of
+/// 0.
+double time_within(double distance, double speed);
 
 /// Sets the positions of mimic joints that follow, which the functions here read.
 void place_mimics(const Kinematics& kinematics, JointMotion* motion);

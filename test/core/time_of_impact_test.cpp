@@ -338,7 +338,7 @@ TEST(MotionBound, noPointMovesFarther) {
     const double radius = i % 3 == 0 ? 0.0 : 0.1;
     JointMotion placed = motion.joints;
     place_mimics(*arm.kinematics, &placed);
-    const MotionBound bound(*arm.kinematics, placed, motion.still, body, center, radius);
+    const MotionBound bound(*arm.kinematics, placed, body, center, radius);
     const double distance = test::uniform(&rng, 0.01, 1.0);
     const double time = std::min(bound.time_for(distance, X_FB), motion.joints.duration - start);
     for (const double share : {0.25, 0.5, 0.75, 1.0}) {

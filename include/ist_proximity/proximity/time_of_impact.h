@@ -37,12 +37,11 @@ struct ImpactTime {
 /// or that the robot carries.
 ///
 /// Conservative advancement (Mirtich 1996): a link whose distance is proven to be d or more cannot
-/// touch anything before one of its points has moved by d. Each step bounds the speed of its points
-/// by the distances of its bounding sphere from the axes of all joints that move it, and by how
-/// fast those can grow. Distances are lower bounds of ProximityQuery, margin included, so no
-/// contact comes before the time that is returned. The search ends where the bound is below 1 um:
-/// along glancing motions that may be long before a contact, or without one. One object per
-/// thread.
+/// touch anything before one of its points is d from where it was. Each step bounds that by the
+/// distances of its bounding sphere from the axes of all joints that move it. Distances are lower
+/// bounds of ProximityQuery, margin included, so no contact comes before the time that is returned.
+/// The search ends where the bound is below 1 um: along glancing motions that may be long before a
+/// contact, or without one. One object per thread.
 class TimeOfImpact {
  public:
   /// @param config  max_distance and margin are read: the time is that of a distance of `margin`
