@@ -4,7 +4,7 @@
 #include <limits>
 #include <optional>
 
-#include "proximity/object_groups.h"
+#include "proximity/world_shape.h"
 
 namespace ist {
 namespace {
@@ -16,21 +16,24 @@ bool is_moved_by_joints(const Kinematics& kinematics, std::size_t body) {
   return false;
 }
 
-// Sets the sphere about the objects of a frame.
+// Sets the sphere about the objects of a frame: it holds the corners of their boxes.
 void enclose(const KnownWorld& world, CarriedWorlds::Frame* frame) {
-  const ObjectGroups& all = *world.groups();
-  const std::size_t first = all.first_group[frame->frame], end = all.first_group[frame->frame + 1];
   Eigen::AlignedBox3d box;
-  for (std::size_t g = first; g < end; ++g) {
-    const Eigen::Array3d center = all.groups[g].center_B;
-    box.extend((center - all.groups[g].radius).matrix());
-    box.extend((center + all.groups[g].radius).matrix());
-  }
+  const auto for_each_corner = [&](const auto& visit) {
+    for (const KnownWorld::Object& object : world.objects()) {
+      if (object.frame != frame->frame) continue;
+      for (int k = 0; k < 8; ++k) {
+        const auto corner = static_cast<Eigen::AlignedBox3d::CornerType>(k);
+        visit(Eigen::Vector3d(object.X_BO * object.shape->surface.box.corner(corner)));
+      }
+    }
+  };
+  for_each_corner([&](const Eigen::Vector3d& p_B) { box.extend(p_B); });
   frame->center_B = box.center();
-  for (std::size_t g = first; g < end; ++g) {
-    const double reach = (all.groups[g].center_B - frame->center_B).norm() + all.groups[g].radius;
-    frame->radius = std::max(frame->radius, reach);
-  }
+  for_each_corner([&](const Eigen::Vector3d& p_B) {
+    const double rounding = 1e-14 * (p_B.norm() + frame->center_B.norm());
+    frame->radius = std::max(frame->radius, (p_B - frame->center_B).norm() + rounding);
+  });
 }
 
 }  // namespace
@@ -43,7 +46,7 @@ void CarriedWorlds::take(Span<const PosedWorld* const> worlds, const Kinematics&
   copy_of_.assign(worlds.size(), 0);
   for (std::size_t w = 0; w < worlds.size(); ++w) {
     const KnownWorld* world = worlds[w]->world.get();
-    if (world == nullptr || world->groups() == nullptr) continue;
+    if (world == nullptr) continue;
     for (std::size_t f = 0; f < world->frames().size(); ++f) {
       const std::optional<std::size_t> body = kinematics.find_body(world->frames()[f]);
       if (!body || !is_moved_by_joints(kinematics, *body)) continue;

@@ -10,15 +10,48 @@
 #include "internal/bvh/build_id.h"
 #include "internal/geometry/cancelled.h"
 #include "internal/geometry/limits.h"
+#include "internal/packing/byte_stream.h"
+#include "internal/packing/packing_cache.h"
 #include "internal/robot/anytime_model.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "proximity/coherence/displacement.h"
-#include "proximity/object_groups.h"
-#include "proximity/shape_cache.h"
 #include "proximity/world_shape.h"
 
 namespace ist {
+
+/// The shapes of a world's objects by geometry_key(), so that objects of equal geometry share one,
+/// and one that is sent again is not built again. It keeps no shape that nobody else has.
+class ShapeCache {
+ public:
+  struct Entry {
+    std::shared_ptr<const LinkGeometry> geometry;  ///< null: not known
+    std::shared_ptr<const WorldShape> shape;
+  };
+
+  Entry find(const std::string& key) const {
+    const auto found = entries_.find(key);
+    if (found == entries_.end()) return {};
+    Entry entry{found->second.geometry.lock(), found->second.shape.lock()};
+    return entry.geometry && entry.shape ? entry : Entry();
+  }
+  void add(const std::string& key, const Entry& entry) {
+    entries_[key] = {entry.geometry, entry.shape};
+    if (entries_.size() < next_cleaning_) return;
+    for (auto one = entries_.begin(); one != entries_.end();) {
+      one = one->second.shape.expired() ? entries_.erase(one) : std::next(one);
+    }
+    next_cleaning_ = 2 * entries_.size() + 64;
+  }
+
+ private:
+  struct Weak {
+    std::weak_ptr<const LinkGeometry> geometry;
+    std::weak_ptr<const WorldShape> shape;
+  };
+  std::map<std::string, Weak> entries_;
+  std::size_t next_cleaning_ = 64;  // size
+};
+
 namespace {
 
 // Spheres of an object's packing. It serves the bounds of depths alone; distances come from the
@@ -66,34 +99,41 @@ std::string sentence(const std::string& name, const std::string& fault) {
   return "object '" + printable(name) + "': " + fault;
 }
 
+// The same for geometries that are the same, and else another one.
+std::string geometry_key(const LinkGeometry& geometry) {
+  ByteWriter key;
+  for (const GeometryElement& element : geometry) {
+    const std::string shape = packing_key(element.shape, {});
+    key.u64(element.source.size());
+    key.raw(element.source.data(), element.source.size());
+    key.raw(shape.data(), shape.size());
+    for (Eigen::Index i = 0; i < 16; ++i) key.f64(element.X_LE.matrix().data()[i]);
+  }
+  return key.bytes();
+}
+
 // An object to add, and its shape.
 struct Taken {
   const WorldObject* object;
+  std::string key;
   ShapeCache::Entry shape;  // without members: not known, or it cannot be built
   std::string fault = {};   // why it cannot
-  bool is_new = false;
 };
 
 // Builds the shapes that are not known, each geometry once.
 // @returns false when it was cancelled
-bool build_missing(std::vector<Taken>* taken, const std::function<bool()>& cancelled) {
-  std::vector<Taken*> missing;
-  std::vector<const LinkGeometry*> geometries;
+bool build_missing(std::vector<Taken>* taken, ShapeCache* shapes,
+                   const std::function<bool()>& cancelled) {
+  std::map<std::string, std::vector<Taken*>> missing;  // by geometry
   for (Taken& one : *taken) {
-    if (one.shape.shape) continue;
-    missing.push_back(&one);
-    geometries.push_back(&one.object->geometry);
+    if (!one.shape.shape) missing[one.key].push_back(&one);
   }
   if (missing.empty()) return true;
-  const std::vector<std::size_t> first = first_of_same(geometries);
   auto description = std::make_shared<RobotDescription>();
-  std::vector<std::size_t> link_of(missing.size());
-  for (std::size_t i = 0; i < missing.size(); ++i) {
-    if (first[i] != i) continue;
-    link_of[i] = description->links.size();
+  for (const auto& [key, same] : missing) {
     LinkDescription link;
-    link.name = "object " + std::to_string(link_of[i]);
-    link.geometry = *geometries[i];
+    link.name = "object " + std::to_string(description->links.size());
+    link.geometry = same.front()->object->geometry;
     description->links.push_back(std::move(link));
   }
   RobotModelConfig config;
@@ -105,21 +145,22 @@ bool build_missing(std::vector<Taken>* taken, const std::function<bool()>& cance
   const auto built =
       AnytimeModel::build(description, config, AnytimeModel::Stage::kFirst, callbacks);
   if (!built) return false;
-  for (std::size_t i = 0; i < missing.size(); ++i) {
-    Taken& one = *missing[i];
-    if (first[i] != i) {
-      one.shape = missing[first[i]]->shape;
-      one.fault = missing[first[i]]->fault;
-      continue;
-    }
-    LinkModel link = built->robot()->links[link_of[i]];
+  std::size_t number = 0;
+  for (const auto& [key, same] : missing) {
+    LinkModel link = built->robot()->links[number++];
+    ShapeCache::Entry entry;
+    std::string fault;
     if (!link.usable() || link.tree.empty()) {
-      one.fault = link.usable() ? "it has neither surface nor volume" : link.error;
-      continue;
+      fault = link.usable() ? "it has neither surface nor volume" : link.error;
+    } else {
+      entry.geometry = std::make_shared<const LinkGeometry>(same.front()->object->geometry);
+      entry.shape = std::make_shared<const WorldShape>(std::move(link), cancelled);
+      shapes->add(key, entry);
     }
-    one.shape.geometry = std::make_shared<const LinkGeometry>(*geometries[i]);
-    one.shape.shape = std::make_shared<const WorldShape>(std::move(link), cancelled);
-    one.is_new = true;
+    for (Taken* one : same) {
+      one->shape = entry;
+      one->fault = fault;
+    }
   }
   return true;
 }
@@ -128,14 +169,6 @@ bool build_missing(std::vector<Taken>* taken, const std::function<bool()>& cance
 
 WorldBuilder::WorldBuilder(const WorldLimits& limits)
     : limits_(limits), shapes_by_geometry_(std::make_shared<ShapeCache>()) {}
-
-Eigen::AlignedBox3d whole_box(const LinkModel& link, const LinkSurface& surface) {
-  Eigen::AlignedBox3d box = bounding_box(link);
-  for (const SurfaceBvh* bvh : {&surface.surface, &surface.opening_cells}) {
-    if (!bvh->empty()) box.extend(bvh->bounds());
-  }
-  return box;
-}
 
 std::string WorldBuilder::exceeded_limit(const std::vector<WorldObject>& objects) const {
   std::size_t triangles = triangles_, shapes = shapes_;
@@ -175,20 +208,21 @@ std::vector<WorldFault> WorldBuilder::add(const std::vector<WorldObject>& object
   for (const WorldObject& object : objects) {
     const std::string fault = object_fault(object);
     if (fault.empty()) {
-      taken.push_back({&object, shapes_by_geometry_->find(object.geometry)});
+      std::string key = geometry_key(object.geometry);
+      const ShapeCache::Entry known = shapes_by_geometry_->find(key);
+      taken.push_back({&object, std::move(key), known});
     } else {
       faults.push_back({object.name, sentence(object.name, fault)});
     }
   }
   try {
-    if (!build_missing(&taken, cancelled)) return faults;
+    if (!build_missing(&taken, shapes_by_geometry_.get(), cancelled)) return faults;
   } catch (const Cancelled&) {
     return faults;
   }
   for (const Taken& one : taken) {
     if (one.shape.shape) {
       insert(*one.object, one.shape.geometry, one.shape.shape);
-      if (one.is_new) shapes_by_geometry_->add(one.shape);
     } else {
       faults.push_back({one.object->name, sentence(one.object->name, one.fault)});
     }
@@ -253,7 +287,6 @@ std::shared_ptr<const KnownWorld> WorldBuilder::world() const {
     world->objects_.push_back(entry.object);
     world->objects_.back().frame = frame->second;
   }
-  world->groups_ = std::make_shared<const ObjectGroups>(*world);
   return world;
 }
 

@@ -28,27 +28,15 @@ double relative_displacement(const LinkSurface& a, const LinkSurface& b,
 }  // namespace
 
 LinkPairQuery::LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
-                             const LinkSurface& surface_b)
+                             const LinkSurface& surface_b, LinkPairQuery* memory)
     : a_(a),
       b_(b),
       surface_a_(surface_a),
       surface_b_(surface_b),
-      surfaces_(surface_a.surface, surface_b.surface, kFrontCapacity),
-      openings_a_(surface_a, surface_b),
-      openings_b_(surface_b, surface_a),
-      are_closed_(a.solid.is_closed() && b.solid.is_closed()),
-      kept_bound_(depth_limit()),
-      depth_bound_(depth_limit()) {}
-
-LinkPairQuery::LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
-                             const LinkSurface& surface_b, LinkPairQuery&& memory)
-    : a_(a),
-      b_(b),
-      surface_a_(surface_a),
-      surface_b_(surface_b),
-      surfaces_(surface_a.surface, surface_b.surface, kFrontCapacity, std::move(memory.surfaces_)),
-      openings_a_(surface_a, surface_b, std::move(memory.openings_a_)),
-      openings_b_(surface_b, surface_a, std::move(memory.openings_b_)),
+      surfaces_(surface_a.surface, surface_b.surface, kFrontCapacity,
+                memory != nullptr ? &memory->surfaces_ : nullptr),
+      openings_a_(surface_a, surface_b, memory != nullptr ? &memory->openings_a_ : nullptr),
+      openings_b_(surface_b, surface_a, memory != nullptr ? &memory->openings_b_ : nullptr),
       are_closed_(a.solid.is_closed() && b.solid.is_closed()),
       kept_bound_(depth_limit()),
       depth_bound_(depth_limit()) {}
@@ -86,24 +74,19 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   range_ = config.max_distance + config.margin;
   range_ += pose_uncertainty(range_);
   surfaces_.move_to(X_BA, since_reference);
-  stage_ = Stage::kSurfaces;
-  are_in_contact_ = has_inside_ = false;
+  is_finished_ = are_in_contact_ = false;
   depth_bound_ = depth_limit();
+  depth_distance_ = kInf;
 }
 
 bool LinkPairQuery::advance(int* steps, std::vector<LinkPairSearch::Entry>* queue) {
-  if (stage_ == Stage::kSurfaces) {
-    if (!surfaces_.run({range_, config_.tolerance, config_.relative_tolerance}, steps))
-      return false;
-    stage_ = Stage::kInside;
-  }
-  if (stage_ == Stage::kInside) {
-    decide_contact(steps);
-    if (!are_apart_) search_spheres(queue);
-    if (are_in_contact_) measure_depth();
-    if (!are_apart_ && are_closed_) bound_by_slabs();
-    stage_ = Stage::kDone;
-  }
+  if (is_finished_) return true;
+  if (!surfaces_.run({range_, config_.tolerance, config_.relative_tolerance}, steps)) return false;
+  decide_contact(steps);
+  if (!are_apart_) search_spheres(queue);
+  if (are_in_contact_) measure_depth();
+  if (!are_apart_ && are_closed_) bound_by_slabs();
+  is_finished_ = true;
   return true;
 }
 
@@ -113,13 +96,13 @@ void LinkPairQuery::decide_contact(int* steps) {
   are_apart_ = are_apart_ && !are_in_contact_;
   if (are_in_contact_ || are_apart_ || !(surfaces_.lower_bound() > 0.0)) return;
   if (are_hulls_apart()) return;
-  are_in_contact_ = is_inside_other();
+  are_in_contact_ = find_inside_point();
   if (are_in_contact_) return;
   const Answer into_a = openings_a_.decide(X_BA_, steps);
   const Answer into_b = openings_b_.decide(X_BA_.inverse(), steps);
-  if (into_a == Answer::kInside) note_inside(openings_a_.inside_B(), false);
-  if (into_b == Answer::kInside) note_inside(openings_b_.inside_B(), true);
-  are_in_contact_ = has_inside_;
+  are_in_contact_ = into_a == Answer::kInside || into_b == Answer::kInside;
+  if (into_a == Answer::kInside) measure_depth_at(openings_a_.inside_B(), false);
+  if (into_b == Answer::kInside) measure_depth_at(X_BA_ * openings_b_.inside_B(), true);
   are_apart_ = into_a == Answer::kApart && into_b == Answer::kApart;
 }
 
@@ -133,8 +116,9 @@ bool LinkPairQuery::are_hulls_apart() {
   return are_apart_ = true;
 }
 
-// Tells whether a component of one is inside the other, where the surfaces are apart.
-bool LinkPairQuery::is_inside_other() {
+// Finds a component of one that is inside the other, where the surfaces are apart. A point of it
+// has a depth, which the spheres and the places where surfaces touch may not show.
+bool LinkPairQuery::find_inside_point() {
   const Eigen::Isometry3d X_AB = X_BA_.inverse();
   const auto holds = [](const LinkModel& link, const SurfaceBvh& surface,
                         const Eigen::Vector3d& p) {
@@ -142,53 +126,30 @@ bool LinkPairQuery::is_inside_other() {
   };
   for (const Eigen::Vector3d& p_A : surface_a_.component_points) {
     if (!holds(b_, surface_b_.surface, X_BA_ * p_A)) continue;
-    note_inside(p_A, true);
+    measure_depth_at(X_BA_ * p_A, true);
     return true;
   }
   for (const Eigen::Vector3d& p_B : surface_b_.component_points) {
     if (!holds(a_, surface_a_.surface, X_AB * p_B)) continue;
-    note_inside(p_B, false);
+    measure_depth_at(p_B, false);
     return true;
   }
   return false;
-}
-
-void LinkPairQuery::note_inside(const Eigen::Vector3d& p, bool of_a) {
-  has_inside_ = true;
-  is_inside_of_a_ = of_a;
-  inside_ = p;
-}
-
-// Keeps the witnesses of a search for the depth if they are deeper.
-void LinkPairQuery::keep_deepest(const LinkPairSearch& search, bool of_a) {
-  depth_bound_ = std::min(depth_bound_, search.lower_bound());
-  if (!(search.distance() < depth_distance_)) return;
-  depth_distance_ = search.distance();
-  if (of_a) {
-    on_a_ = search.p_BCa();
-    on_b_ = search.p_BCb();
-    direction_ = search.normal_B();
-  } else {  // in A's frame, and the link that is searched is B
-    on_a_ = X_BA_ * search.p_BCb();
-    on_b_ = X_BA_ * search.p_BCa();
-    direction_ = -(X_BA_.linear() * search.normal_B());
-  }
 }
 
 // Bounds the depth by the spheres of both, also where it is not decided whether there is one: less
 // than a nanometre from touch, or where a surface is next to an opening. A point that is found
 // inside both decides that.
 void LinkPairQuery::search_spheres(std::vector<LinkPairSearch::Entry>* queue) {
-  depth_bound_ = kInf;
-  depth_distance_ = kInf;
   QueryConfig config = config_;
   config.max_distance = range_;
   LinkPairSearch of_a(a_, b_, X_BA_, config, queue);
   of_a.run(kDepthSteps);
-  keep_deepest(of_a, true);
+  keep_deeper(of_a.p_BCa(), of_a.closest(), true);
   LinkPairSearch of_b(b_, a_, X_BA_.inverse(), config, queue);
   of_b.run(kDepthSteps);
-  keep_deepest(of_b, false);
+  keep_deeper(X_BA_ * of_b.p_BCa(), of_b.closest(), false);
+  depth_bound_ = std::min(of_a.lower_bound(), of_b.lower_bound());
   // No point of either is inside the other.
   are_apart_ = !are_in_contact_ && depth_bound_ > 0.0 && surfaces_.lower_bound() > 0.0;
   are_in_contact_ = are_in_contact_ || depth_distance_ < 0.0;
@@ -196,23 +157,27 @@ void LinkPairQuery::search_spheres(std::vector<LinkPairSearch::Entry>* queue) {
 }
 
 void LinkPairQuery::measure_depth() {
-  if (has_inside_) measure_inside_point();
   if (!(depth_distance_ < 0.0)) search_from_touch();
   if (!(depth_distance_ < 0.0)) search_along_parts();
   depth_bound_ = std::min(depth_bound_, depth_distance_);
 }
 
-// The surfaces may be far apart where one link reaches into the other through an opening, and the
-// spheres may show no point inside both.
-void LinkPairQuery::measure_inside_point() {
-  const Eigen::Vector3d q_B = is_inside_of_a_ ? Eigen::Vector3d(X_BA_ * inside_) : inside_;
-  const SignedDistance found = is_inside_of_a_ ? b_.solid.signed_distance(q_B)
-                                               : a_.solid.signed_distance(X_BA_.inverse() * q_B);
-  if (!(found.distance < std::min(depth_distance_, 0.0))) return;
+// Measures a point of one link against the other.
+void LinkPairQuery::measure_depth_at(const Eigen::Vector3d& q_B, bool is_of_a) {
+  const SignedDistance found =
+      is_of_a ? b_.solid.signed_distance(q_B) : a_.solid.signed_distance(X_BA_.inverse() * q_B);
+  keep_deeper(q_B, found, is_of_a);
+}
+
+// Keeps a point of one link if it is the deepest so far.
+// @param found  the point's signed distance to the other link, in that link's frame
+void LinkPairQuery::keep_deeper(const Eigen::Vector3d& q_B, const SignedDistance& found,
+                                bool is_of_a) {
+  if (!(found.distance < depth_distance_)) return;
   depth_distance_ = found.distance;
-  on_a_ = is_inside_of_a_ ? q_B : Eigen::Vector3d(X_BA_ * found.witness);
-  on_b_ = is_inside_of_a_ ? found.witness : q_B;
-  direction_ = is_inside_of_a_ ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
+  on_a_ = is_of_a ? q_B : Eigen::Vector3d(X_BA_ * found.witness);
+  on_b_ = is_of_a ? found.witness : q_B;
+  direction_ = is_of_a ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
 }
 
 // Steps from a point where the surfaces meet, alternately into the one and the other: solids that
@@ -230,12 +195,7 @@ void LinkPairQuery::search_from_touch() {
     for (int i = 0; i < kProjections; ++i) {
       const SignedDistance to_b = b_.solid.signed_distance(q_B);
       const SignedDistance to_a = a_.solid.signed_distance(X_AB * q_B);
-      if (to_a.distance < 0.0 && to_b.distance < depth_distance_) {
-        depth_distance_ = to_b.distance;
-        on_a_ = q_B;
-        on_b_ = to_b.witness;
-        direction_ = to_b.normal;
-      }
+      if (to_a.distance < 0.0) keep_deeper(q_B, to_b, true);
       if (to_a.distance > to_b.distance) {
         q_B -= (to_a.distance + depth) * (X_BA_.linear() * to_a.normal);
       } else {
@@ -245,32 +205,19 @@ void LinkPairQuery::search_from_touch() {
   }
 }
 
-// Some corners of a triangle that passes through the other link lead inward.
+// Some corners of a triangle that passes through the other link lead inward: points from where it
+// touches to a corner are measured.
 void LinkPairQuery::search_along_parts() {
-  const ConvexPart parts[] = {surfaces_.part_a(), surfaces_.part_b()};
-  for (int i = 0; i < 2; ++i) {
-    if (parts[i].kind != ConvexPart::Kind::kTriangle) continue;
-    for (const Eigen::Vector3d& corner : {parts[i].a, parts[i].b, parts[i].c}) {
-      search_toward(corner, i == 0);
-    }
-  }
-}
-
-// Measures points of one link, from a corner of a touching triangle to where it touches, against
-// the other link.
-void LinkPairQuery::search_toward(const Eigen::Vector3d& corner_B, bool is_of_a) {
   constexpr double kLast = 1e-7;  // share of the way to the corner
   const Eigen::Vector3d touch_B = surfaces_.closest().on_q;
-  const Eigen::Isometry3d X_AB = X_BA_.inverse();
-  for (double share = 1.0; share > kLast; share *= 0.25) {
-    const Eigen::Vector3d q_B = touch_B + share * (corner_B - touch_B);
-    const SignedDistance found =
-        is_of_a ? b_.solid.signed_distance(q_B) : a_.solid.signed_distance(X_AB * q_B);
-    if (!(found.distance < depth_distance_)) continue;
-    depth_distance_ = found.distance;
-    on_a_ = is_of_a ? q_B : Eigen::Vector3d(X_BA_ * found.witness);
-    on_b_ = is_of_a ? found.witness : q_B;
-    direction_ = is_of_a ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
+  for (const bool is_of_a : {true, false}) {
+    const ConvexPart part = is_of_a ? surfaces_.part_a() : surfaces_.part_b();
+    if (part.kind != ConvexPart::Kind::kTriangle) continue;
+    for (const Eigen::Vector3d& corner : {part.a, part.b, part.c}) {
+      for (double share = 1.0; share > kLast; share *= 0.25) {
+        measure_depth_at(touch_B + share * (corner - touch_B), is_of_a);
+      }
+    }
   }
 }
 
@@ -328,35 +275,25 @@ double LinkPairQuery::lower_bound() const {
 
 void LinkPairQuery::report(PairProximity* result) const {
   result->reset();
-  result->finished = stage_ == Stage::kDone;
-  result->decided = is_decided();
+  result->finished = is_finished_;
   const double lower = lower_bound();
   if (lower >= range_) {
+    result->decided = is_decided();
     result->state = LinkState::kClear;
     result->distance = kInf;
     result->lower_bound = config_.max_distance;
     return;
   }
-  result->lower_bound = lower - pose_uncertainty(lower) - config_.margin;
-  if (are_in_contact_) {
-    result->state = depth_distance_ < 0.0 ? LinkState::kContact : LinkState::kNear;
-    result->distance = depth_distance_;
-    result->p_FCa = X_FB_ * on_a_;
-    result->p_FCb = X_FB_ * on_b_;
-    result->direction = X_FB_.linear() * direction_;
-    return;
-  }
   const ConvexDistance& closest = surfaces_.closest();
-  if (!(closest.distance > 0.0 && closest.distance < kInf)) {
-    result->reset();
-    result->finished = stage_ == Stage::kDone;
-    return;
-  }
-  result->state = LinkState::kNear;
-  result->distance = closest.distance;
-  result->p_FCa = X_FB_ * closest.on_p;
-  result->p_FCb = X_FB_ * closest.on_q;
-  result->direction = X_FB_.linear() * (closest.on_p - closest.on_q).normalized();
+  if (!are_in_contact_ && !(closest.distance > 0.0 && closest.distance < kInf)) return;
+  result->decided = is_decided();
+  result->lower_bound = lower - pose_uncertainty(lower) - config_.margin;
+  result->state = are_in_contact_ && depth_distance_ < 0.0 ? LinkState::kContact : LinkState::kNear;
+  result->distance = are_in_contact_ ? depth_distance_ : closest.distance;
+  result->p_FCa = X_FB_ * (are_in_contact_ ? on_a_ : closest.on_p);
+  result->p_FCb = X_FB_ * (are_in_contact_ ? on_b_ : closest.on_q);
+  result->direction =
+      X_FB_.linear() * (are_in_contact_ ? direction_ : (closest.on_p - closest.on_q).normalized());
 }
 
 }  // namespace ist

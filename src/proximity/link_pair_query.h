@@ -17,13 +17,11 @@ namespace ist {
 /// contact, how deep. Nothing is allocated after construction.
 class LinkPairQuery {
  public:
-  /// All arguments outlive this.
+  /// @param a, b, surface_a, surface_b  outlive this
+  /// @param memory  of another query, which is void then: nothing is allocated where the other
+  ///                one's links had holes too, or these have none; null: there is none
   LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
-                const LinkSurface& surface_b);
-  /// The same in the memory of another query, which is void then: nothing is allocated where the
-  /// other one's links had holes too, or these have none.
-  LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
-                const LinkSurface& surface_b, LinkPairQuery&& memory);
+                const LinkSurface& surface_b, LinkPairQuery* memory = nullptr);
 
   /// The poses of the next steps. Bounds hold for them from here on.
   void move_to(const RigidPose& X_FA, const RigidPose& X_FB, const QueryConfig& config);
@@ -42,19 +40,15 @@ class LinkPairQuery {
   void report(PairProximity* result) const;
 
  private:
-  enum class Stage { kSurfaces, kInside, kDone };
-
   void decide_contact(int* steps);
   bool are_hulls_apart();
-  bool is_inside_other();
-  void note_inside(const Eigen::Vector3d& p, bool of_a);
+  bool find_inside_point();
   void search_spheres(std::vector<LinkPairSearch::Entry>* queue);
   void measure_depth();
-  void measure_inside_point();
-  void keep_deepest(const LinkPairSearch& search, bool of_a);
+  void measure_depth_at(const Eigen::Vector3d& q_B, bool is_of_a);
+  void keep_deeper(const Eigen::Vector3d& q_B, const SignedDistance& found, bool is_of_a);
   void search_from_touch();
   void search_along_parts();
-  void search_toward(const Eigen::Vector3d& corner_B, bool is_of_a);
   void bound_by_slabs();
   double slab_width(const Eigen::Vector3d& up_B) const;
   double pose_uncertainty(double distance) const;
@@ -64,7 +58,7 @@ class LinkPairQuery {
   const LinkSurface &surface_a_, &surface_b_;
   SurfacePairSearch surfaces_;
   OpeningSearch openings_a_, openings_b_;
-  Stage stage_ = Stage::kSurfaces;
+  bool is_finished_ = false;
   bool are_apart_ = false;  // no point of one is inside the other, at this pose
   bool are_in_contact_ = false;
   const bool are_closed_;  // both
@@ -79,9 +73,6 @@ class LinkPairQuery {
   // known to be apart.
   double depth_bound_, depth_distance_ = 0.0;  // [m]
   Eigen::Vector3d on_a_, on_b_, direction_;
-  // A point of one link that was found inside the other, in the frame of its link.
-  bool has_inside_ = false, is_inside_of_a_ = false;
-  Eigen::Vector3d inside_;
 };
 
 }  // namespace ist

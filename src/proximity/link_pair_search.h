@@ -32,11 +32,9 @@ class LinkPairSearch {
   /// @param max_steps  parts and spheres that may be visited; the bounds of the others count
   void run(int max_steps);
 
-  double lower_bound() const { return lower_bound_; }                ///< [m]
-  double distance() const { return closest_.distance; }              ///< [m] upper bound
-  const Eigen::Vector3d& p_BCa() const { return p_BCa_; }            ///< [m] witness on A
-  const Eigen::Vector3d& p_BCb() const { return closest_.witness; }  ///< [m] on B
-  const Eigen::Vector3d& normal_B() const { return closest_.normal; }
+  double lower_bound() const { return lower_bound_; }         ///< [m]
+  const Eigen::Vector3d& p_BCa() const { return p_BCa_; }     ///< [m] of A, in B's frame
+  const SignedDistance& closest() const { return closest_; }  ///< of that point to B
 
  private:
   double interior_allowance() const;

@@ -23,7 +23,7 @@ double distance_to_box(const Eigen::Vector3d& p, const Eigen::Vector3d& half) {
 }  // namespace
 
 void PosedObject::place(const Eigen::Isometry3d& X_FO_given) {
-  const Eigen::AlignedBox3d& box = object->shape->box;
+  const Eigen::AlignedBox3d& box = object->shape->surface.box;
   X_FO = nearest_rigid(X_FO_given);
   center_F = X_FO.X * box.center();
   half = 0.5 * box.sizes();
@@ -31,50 +31,10 @@ void PosedObject::place(const Eigen::Isometry3d& X_FO_given) {
   extent = box.center().norm() + radius;
 }
 
-// A point x of an object is placed at Q x + t, Q the rotation nearest to R_FB R_BO. It is no
-// farther from R_FB R_BO x + t than the drift of that product times |x|; the drift of a product is
-// no more than the sum of the drifts, but for their squares.
-void PosedGroup::place() {
-  constexpr double kMaxDrift = 0.01, kSquares = 1.1;
-  const double frame_drift = nearest_rigid(*X_FB).drift;
-  drift = kSquares * (frame_drift + group->drift);
-  center_F = *X_FB * group->center_B;
-  radius = group->radius * (1.0 + frame_drift) + drift * group->extent;
-  if (!(frame_drift <= kMaxDrift && group->drift <= kMaxDrift)) radius = kInf;
-}
-
-double PosedGroup::moves_at_most(const Eigen::Isometry3d& X_FB_next) const {
-  PosedGroup next = *this;
-  next.X_FB = &X_FB_next;
-  next.place();
-  if (!(radius < kInf && next.radius < kInf)) return kInf;
-  const double turned = (X_FB_next.linear() - X_FB->linear()).norm();
-  const double moved = (next.center_F - center_F).norm() + turned * group->radius;
-  const double scale = center_F.norm() + next.center_F.norm() + radius + group->center_B.norm();
-  return moved + (drift + next.drift) * group->extent + kBoxRounding * scale;
-}
-
-void PosedObjects::place(PosedGroup* posed) {
-  const ObjectGroup& group = *posed->group;
-  const KnownWorld& world = *worlds[posed->world];
-  const bool is_new = posed->first_placed == PosedGroup::kNotPlaced;
-  if (is_new) posed->first_placed = objects.size();
-  for (std::size_t m = group.first; m < group.last; ++m) {
-    const std::size_t at = posed->first_placed + m - group.first;
-    if (is_new) objects.emplace_back();
-    PosedObject& object = objects[at];
-    object.index = world.groups()->members[m];
-    object.world = posed->world;
-    object.object = &world.objects()[object.index];
-    object.place(*posed->X_FB * object.object->X_BO);
-    ++placed;
-  }
-}
-
 ObjectSearch::ObjectSearch(const RobotSurfaces& robot, std::size_t link)
     : link_(link), model_(robot.model->links[link]), surface_(robot.surfaces[link].get()) {
   if (surface_ == nullptr) return;
-  const Eigen::AlignedBox3d& box = robot.boxes[link];
+  const Eigen::AlignedBox3d& box = surface_->box;
   center_L_ = box.center();
   half_L_ = 0.5 * box.sizes();
   radius_ = half_L_.norm();
@@ -105,6 +65,15 @@ double ObjectSearch::margin_of(const PosedObject& object) const {
   return question_.config.margin + question_.link_margin + object.object->margin;
 }
 
+// [m] What is left of a lower bound of the distance to an object; -inf where that is not positive.
+double ObjectSearch::less_errors(double bound, const PosedObject& object) const {
+  const double scale = center_F_.norm() + object.center_F.norm() + radius_ + object.radius;
+  bound -= kBoxRounding * scale;
+  const double drift = X_FL_.drift + object.X_FO.drift;
+  const double proven = bound - pose_error(drift, extent_ + object.extent, bound);
+  return proven > 0.0 ? proven : -kInf;
+}
+
 // [m] A lower bound of the distance of the boxes; -inf where they may overlap.
 double ObjectSearch::box_bound(const PosedObject& object) const {
   const Eigen::Vector3d p_F = center_F_ - object.center_F;
@@ -112,22 +81,7 @@ double ObjectSearch::box_bound(const PosedObject& object) const {
       distance_to_box(object.X_FO.X.linear().transpose() * p_F, object.half) - radius_;
   const double to_link =
       distance_to_box(X_FL_.X.linear().transpose() * p_F, half_L_) - object.radius;
-  const double scale = center_F_.norm() + object.center_F.norm() + radius_ + object.radius;
-  const double bound = std::max(to_object, to_link) - kBoxRounding * scale;
-  const double drift = X_FL_.drift + object.X_FO.drift;
-  const double proven = bound - pose_error(drift, extent_ + object.extent, bound);
-  return proven > 0.0 ? proven : -kInf;
-}
-
-// [m] No object of the group has a lower bound by boxes, its margin taken off, that is less; -inf
-// where it is not known.
-double ObjectSearch::group_bound(const PosedGroup& posed) const {
-  const double apart = (center_F_ - posed.center_F).norm();
-  const double scale = center_F_.norm() + posed.center_F.norm() + radius_ + posed.radius;
-  const double bound = apart - radius_ - posed.radius - 4.0 * kBoxRounding * scale;
-  const double drift = X_FL_.drift + posed.drift;
-  const double proven = bound - pose_error(drift, extent_ + posed.group->extent, bound);
-  return proven > 0.0 ? proven - posed.group->margin : -kInf;
+  return less_errors(std::max(to_object, to_link), object);
 }
 
 void ObjectSearch::begin_unknown() {
@@ -138,11 +92,11 @@ void ObjectSearch::begin_unknown() {
   near_.clear();
 }
 
-void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, PosedObjects* objects,
+void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, const PosedObjects& objects,
                          const ObjectQuestion& question, WorldQueryStatistics* statistics) {
   begin_unknown();
   if (surface_ == nullptr || !X_FL.matrix().allFinite()) return;
-  objects_ = objects;
+  objects_ = &objects;
   question_ = question;
   statistics_ = statistics;
   X_FL_ = nearest_rigid(X_FL);
@@ -159,7 +113,7 @@ void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, PosedObjects* objects,
   }
   // The nearest object of the last time is the first one, as it gives the best upper bound.
   const auto first = std::find_if(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
-    return objects->objects[c.object].object->id == nearest_id_;
+    return objects.objects[c.object].object->id == nearest_id_;
   });
   std::swap(first != candidates_.end() ? *first
                                        : *std::max_element(candidates_.begin(), candidates_.end()),
@@ -181,19 +135,13 @@ void ObjectSearch::list_objects() {
   }
   ++statistics_->scans;
   list_.clear();
-  for (PosedGroup& group : objects_->groups) {
-    ++statistics_->groups_bounded;
-    if (group_bound(group) >= range + kListSlack) continue;
-    if (group.first_placed == PosedGroup::kNotPlaced) objects_->place(&group);
-    const std::size_t end = group.first_placed + group.group->last - group.group->first;
-    statistics_->objects_bounded += end - group.first_placed;
-    for (std::size_t i = group.first_placed; i < end; ++i) {
-      const PosedObject& object = objects_->objects[i];
-      if (objects_->is_allowed(object, link_)) continue;
-      const double bound = box_bound(object);
-      if (bound - object.object->margin < range + kListSlack)
-        list_.push_back(static_cast<std::uint32_t>(i));
-    }
+  statistics_->objects_bounded += objects_->objects.size();
+  for (std::size_t i = 0; i < objects_->objects.size(); ++i) {
+    const PosedObject& object = objects_->objects[i];
+    const double reach = range + kListSlack + object.object->margin;
+    const double apart = (center_F_ - object.center_F).norm() - radius_ - object.radius;
+    if (less_errors(apart, object) >= reach || objects_->is_allowed(i, link_)) continue;
+    if (box_bound(object) < reach) list_.push_back(static_cast<std::uint32_t>(i));
   }
   X_FL_of_list_ = X_FL_.X;
   path_of_list_ = objects_->path;
@@ -230,7 +178,7 @@ ObjectSearch::Slot* ObjectSearch::slot_of(const PosedObject& object) {
     if (slot.used < oldest->used) oldest = &slot;
   }
   const WorldShape& shape = *object.object->shape;
-  LinkPairQuery fresh(model_, shape.link, *surface_, shape.surface, std::move(*oldest->query));
+  LinkPairQuery fresh(model_, shape.link, *surface_, shape.surface, &*oldest->query);
   oldest->query.emplace(std::move(fresh));
   oldest->shape = object.object->shape;
   oldest->id = object.object->id;
@@ -290,20 +238,16 @@ void ObjectSearch::take_result() {
 
 void ObjectSearch::take_distance(const PairProximity& found) {
   if (found.state != LinkState::kNear && found.state != LinkState::kContact) return;
-  if (near_.size() < near_.capacity()) {
-    const PosedObject& object = objects_->objects[current_candidate_.object];
-    near_.push_back({object.world, object.index, answer_of(found)});
-    near_.back().answer.source = static_cast<std::int32_t>(object.world);
-    near_.back().answer.point = object.index;
-  }
+  const PosedObject& object = objects_->objects[current_candidate_.object];
+  const LinkProximity answer = answer_of(found, object);
+  if (near_.size() < near_.capacity()) near_.push_back({object.world, object.index, answer});
   if (!(found.distance < distance_)) return;
   distance_ = found.distance;
-  nearest_ = current_candidate_.object;
-  nearest_pair_ = found;
-  nearest_id_ = objects_->objects[nearest_].object->id;
+  nearest_ = answer;
+  nearest_id_ = object.object->id;
 }
 
-LinkProximity ObjectSearch::answer_of(const PairProximity& found) const {
+LinkProximity ObjectSearch::answer_of(const PairProximity& found, const PosedObject& object) const {
   LinkProximity answer;
   answer.state = found.state;
   answer.distance = found.distance;
@@ -312,6 +256,8 @@ LinkProximity ObjectSearch::answer_of(const PairProximity& found) const {
   answer.p_LCl = X_FL_.X.inverse() * found.p_FCa;
   answer.p_FCo = found.p_FCb;
   answer.direction = found.direction;
+  answer.source = static_cast<std::int32_t>(object.world);
+  answer.point = object.index;
   return answer;
 }
 
@@ -328,7 +274,8 @@ double ObjectSearch::lower_bound() const {
   return bound;
 }
 
-void ObjectSearch::report(LinkProximity* result) const {
+void ObjectSearch::report(LinkProximity* result) {
+  if (current_ != nullptr) take_result();  // the deadline came before it was measured
   result->reset();
   if (!is_known_) return;
   const double bound = lower_bound();
@@ -338,25 +285,9 @@ void ObjectSearch::report(LinkProximity* result) const {
     result->lower_bound = question_.config.max_distance;
     return;
   }
-  PairProximity pair = nearest_pair_;
-  std::uint32_t nearest = nearest_;
-  double distance = distance_;
-  if (current_ != nullptr) {  // the deadline came before it was measured
-    PairProximity found;
-    current_->query->report(&found);
-    const bool has_points = found.state == LinkState::kNear || found.state == LinkState::kContact;
-    if (has_points && found.distance < distance) {
-      pair = found;
-      nearest = current_candidate_.object;
-      distance = found.distance;
-    }
-  }
-  if (!(distance < kInf) || bound == -kInf) return;
-  *result = answer_of(pair);
-  const PosedObject& object = objects_->objects[nearest];
-  result->lower_bound = std::min(bound, distance - question_.config.margin);
-  result->source = static_cast<std::int32_t>(object.world);
-  result->point = object.index;
+  if (!(distance_ < kInf) || bound == -kInf) return;
+  *result = nearest_;
+  result->lower_bound = std::min(bound, distance_ - question_.config.margin);
 }
 
 }  // namespace ist

@@ -11,7 +11,6 @@
 #include "ist_proximity/proximity/known_world.h"
 #include "ist_proximity/proximity/world_query.h"
 #include "proximity/link_pair_query.h"
-#include "proximity/object_groups.h"
 #include "proximity/robot_surfaces.h"
 #include "proximity/world_shape.h"
 
@@ -29,42 +28,17 @@ struct PosedObject {
   void place(const Eigen::Isometry3d& X_FO_given);
 };
 
-/// A group of objects at the pose of their frame.
-struct PosedGroup {
-  static constexpr std::size_t kNotPlaced = std::numeric_limits<std::size_t>::max();
-
-  const ObjectGroup* group = nullptr;       ///< owned by its world
-  const Eigen::Isometry3d* X_FB = nullptr;  ///< of its frame
-  std::uint32_t world = 0;                  ///< its world
-  Eigen::Vector3d center_F;                 ///< [m] of a sphere about its placed objects
-  double radius = 0.0;                      ///< [m] of that sphere; inf: it is not known
-  double drift = 0.0;                       ///< of no object is it larger
-  std::size_t first_placed = kNotPlaced;    ///< in PosedObjects::objects
-
-  void place();
-  /// [m] No point of its objects moves farther when the frame's pose becomes another one.
-  double moves_at_most(const Eigen::Isometry3d& X_FB_next) const;
-};
-
-/// All objects of a query. Those of a group are placed when a link first comes near to it, so that
-/// a world may be large.
+/// All objects of a query.
 struct PosedObjects {
-  std::vector<PosedObject> objects;  ///< those that are placed; it has memory for all
-  std::vector<PosedGroup> groups;
-  std::vector<const KnownWorld*> worlds;    ///< of the query
-  std::vector<std::size_t> first_of_world;  ///< number of a world's first object, among all
-  std::vector<std::uint64_t> allowed;       ///< by object: `words` of bits, one for each link
+  std::vector<PosedObject> objects;
+  std::vector<std::uint64_t> allowed;  ///< by object: `words` of bits, one for each link
   std::size_t words = 0;
   double path = 0.0;             ///< [m] no object has moved farther, all motions added
   std::uint64_t generation = 0;  ///< another one whenever the objects are others
-  std::uint64_t placed = 0;      ///< placements of objects, counted
 
-  bool is_allowed(const PosedObject& object, std::size_t link) const {
-    const std::size_t number = first_of_world[object.world] + object.index;
-    return (allowed[number * words + link / 64] >> (link % 64) & 1U) != 0;
+  bool is_allowed(std::size_t object, std::size_t link) const {
+    return (allowed[object * words + link / 64] >> (link % 64) & 1U) != 0;
   }
-  /// Places the objects of a group, or places them anew.
-  void place(PosedGroup* group);
 };
 
 /// The question to one link.
@@ -88,9 +62,9 @@ class ObjectSearch {
   void prepare(std::size_t objects, const WorldShape* open);
 
   /// Begins a query: bounds by boxes, and the distance to one object.
-  /// @param objects  of which those are placed that are near
-  void begin(const Eigen::Isometry3d& X_FL, PosedObjects* objects, const ObjectQuestion& question,
-             WorldQueryStatistics* statistics);
+  /// @param objects  outlive the query
+  void begin(const Eigen::Isometry3d& X_FL, const PosedObjects& objects,
+             const ObjectQuestion& question, WorldQueryStatistics* statistics);
   /// The link is UNKNOWN.
   void begin_unknown();
   /// Goes on until the tolerance is reached.
@@ -100,7 +74,8 @@ class ObjectSearch {
   /// [m] What is proven so far, margins taken off.
   double lower_bound() const;
   bool is_finished() const { return is_finished_; }
-  void report(LinkProximity* result) const;
+  /// Ends the query.
+  void report(LinkProximity* result);
   const std::vector<NearObject>& near() const { return near_; }
 
  private:
@@ -116,8 +91,8 @@ class ObjectSearch {
     std::uint64_t used = 0;  ///< number of the last query
   };
 
+  double less_errors(double bound, const PosedObject& object) const;
   double box_bound(const PosedObject& object) const;
-  double group_bound(const PosedGroup& group) const;
   double margin_of(const PosedObject& object) const;
   double stop_bound() const;
   void list_objects();
@@ -126,7 +101,7 @@ class ObjectSearch {
   Slot* slot_of(const PosedObject& object);
   void take_result();
   void take_distance(const PairProximity& found);
-  LinkProximity answer_of(const PairProximity& found) const;
+  LinkProximity answer_of(const PairProximity& found, const PosedObject& object) const;
 
   const std::size_t link_;
   const LinkModel& model_;
@@ -146,7 +121,7 @@ class ObjectSearch {
   std::uint64_t nearest_id_ = 0;  // of the last query
 
   // One query.
-  PosedObjects* objects_ = nullptr;
+  const PosedObjects* objects_ = nullptr;
   ObjectQuestion question_;
   WorldQueryStatistics* statistics_ = nullptr;
   RigidPose X_FL_;
@@ -158,8 +133,7 @@ class ObjectSearch {
   bool is_known_ = false, is_finished_ = true;
   double proven_ = 0.0;  // [m] of the pairs that are measured
   double distance_ = std::numeric_limits<double>::infinity();
-  std::uint32_t nearest_ = 0;
-  PairProximity nearest_pair_;
+  LinkProximity nearest_;
   std::vector<NearObject> near_;
 };
 

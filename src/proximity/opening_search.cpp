@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include "internal/geometry/closest_point_on_triangle.h"
 
@@ -96,19 +95,11 @@ class CellVisitor : public SurfacePairSearch::Visitor {
 
 }  // namespace
 
-OpeningSearch::OpeningSearch(const LinkSurface& a, const LinkSurface& b)
-    : a_(a),
-      is_closed_(a.opening_cells.empty()),
-      search_(a.opening_cells, b.surface, is_closed_ ? 2 * SurfaceBvh::kWidth : kFrontCapacity),
-      moved_(kInf) {
-  if (is_closed_) clearance_ = kInf;
-}
-
-OpeningSearch::OpeningSearch(const LinkSurface& a, const LinkSurface& b, OpeningSearch&& memory)
+OpeningSearch::OpeningSearch(const LinkSurface& a, const LinkSurface& b, OpeningSearch* memory)
     : a_(a),
       is_closed_(a.opening_cells.empty()),
       search_(a.opening_cells, b.surface, is_closed_ ? 2 * SurfaceBvh::kWidth : kFrontCapacity,
-              std::move(memory.search_)),
+              memory != nullptr ? &memory->search_ : nullptr),
       moved_(kInf) {
   if (is_closed_) clearance_ = kInf;
 }

@@ -14,10 +14,9 @@ namespace ist {
 /// in its path.
 class OpeningSearch {
  public:
-  /// Both outlive this.
-  OpeningSearch(const LinkSurface& a, const LinkSurface& b);
-  /// The same in the memory of another search, as for SurfacePairSearch.
-  OpeningSearch(const LinkSurface& a, const LinkSurface& b, OpeningSearch&& memory);
+  /// @param a, b    outlive this
+  /// @param memory  of another search, as for SurfacePairSearch
+  OpeningSearch(const LinkSurface& a, const LinkSurface& b, OpeningSearch* memory);
 
   /// Knowledge at a pose.
   enum class Answer {

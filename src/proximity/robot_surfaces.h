@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <memory>
 #include <vector>
 
@@ -12,7 +11,6 @@ namespace ist {
 struct RobotSurfaces {
   std::shared_ptr<const RobotModel> model;
   std::vector<std::shared_ptr<const LinkSurface>> surfaces;  ///< by link; null: not usable
-  std::vector<Eigen::AlignedBox3d> boxes;                    ///< by link: see whole_box()
 };
 
 }  // namespace ist

@@ -42,18 +42,6 @@ double child_bound(const ConvexPart& part, const SurfaceBvh::Node& node, std::si
 
 }  // namespace
 
-// What boxes are compared with, in float.
-void SurfacePairSearch::prepare_boxes() {
-  if (has_boxes_) return;
-  has_boxes_ = true;
-  X_AB_ = X_BA_.inverse();
-  R_BA_ = X_BA_.linear().cast<float>();
-  p_BA_ = X_BA_.translation().cast<float>();
-  R_AB_ = X_AB_.linear().cast<float>();
-  p_AB_ = X_AB_.translation().cast<float>();
-  set_direction();
-}
-
 void SurfacePairSearch::set_direction() {
   Eigen::Vector3d n = closest_.on_p - closest_.on_q;
   if (!(closest_.distance > 1e-9 && closest_.distance < kInf)) {

@@ -31,10 +31,8 @@ std::shared_ptr<const RobotSurfaces> make_robot_surfaces(std::shared_ptr<const R
   try {
     for (const LinkModel& link : model->links) {
       robot->surfaces.emplace_back();
-      robot->boxes.emplace_back();
       if (!link.usable() || link.tree.empty()) continue;
       robot->surfaces.back() = LinkSurface::of(link, cancelled);
-      robot->boxes.back() = whole_box(link, *robot->surfaces.back());
     }
   } catch (const Cancelled&) {
     return nullptr;
@@ -55,8 +53,6 @@ struct WorldQuery::Impl {
   void list_objects(Span<const PosedWorld* const> given);
   void prepare_searches();
   void note_allowed(const std::vector<std::string>& names, std::uint64_t* bits) const;
-  bool has_objects(std::size_t w) const { return worlds[w].world && groups_of(w) != nullptr; }
-  const ObjectGroups* groups_of(std::size_t w) const { return worlds[w].world->groups(); }
   void move_objects(Span<const PosedWorld* const> given);
   void finish_by(Deadline* deadline);
   void count_unfinished(const LinkProximity& result);
@@ -68,7 +64,7 @@ struct WorldQuery::Impl {
   WorldQueryStatistics statistics;
   std::vector<PosedWorld> worlds;  // of the last run
   PosedObjects objects;
-  std::size_t total = 0;               // objects of all worlds, placed or not
+  std::vector<bool> has_moved;         // scratch: by frame of a world
   std::vector<ObjectSearch> searches;  // by link
   std::vector<Waiting> queue;          // a heap
   std::vector<LinkPairSearch::Entry> depth_queue;
@@ -117,37 +113,26 @@ void WorldQuery::Impl::note_allowed(const std::vector<std::string>& names,
 
 void WorldQuery::Impl::list_objects(Span<const PosedWorld* const> given) {
   objects.objects.clear();
-  objects.groups.clear();
-  objects.worlds.clear();
-  objects.first_of_world.clear();
   ++objects.generation;
   objects.path = 0.0;
   worlds.resize(given.size());
-  total = 0;
   for (std::size_t w = 0; w < given.size(); ++w) {
     worlds[w] = *given[w];
-    objects.worlds.push_back(worlds[w].world.get());
-    objects.first_of_world.push_back(total);
-    if (!has_objects(w)) continue;
-    total += worlds[w].world->objects().size();
-    for (const ObjectGroup& group : groups_of(w)->groups) {
-      PosedGroup posed;
-      posed.group = &group;
-      posed.X_FB = &worlds[w].X_FB[group.frame];
+    if (!worlds[w].world) continue;
+    has_moved.reserve(worlds[w].X_FB.size());
+    for (const KnownWorld::Object& object : worlds[w].world->objects()) {
+      objects.objects.emplace_back();
+      PosedObject& posed = objects.objects.back();
+      posed.object = &object;
       posed.world = static_cast<std::uint32_t>(w);
-      posed.place();
-      objects.groups.push_back(posed);
+      posed.index = static_cast<std::uint32_t>(&object - worlds[w].world->objects().data());
+      posed.place(worlds[w].X_FB[object.frame] * object.X_BO);
     }
   }
-  objects.objects.reserve(total);
-  objects.allowed.assign(objects.words * total, 0);
-  for (std::size_t w = 0; w < worlds.size(); ++w) {
-    if (!has_objects(w)) continue;
-    for (const std::uint32_t i : groups_of(w)->touchable) {
-      const std::size_t number = objects.first_of_world[w] + i;
-      note_allowed(worlds[w].world->objects()[i].allowed_links,
-                   &objects.allowed[number * objects.words]);
-    }
+  statistics.objects_placed = objects.objects.size();
+  objects.allowed.assign(objects.words * objects.objects.size(), 0);
+  for (std::size_t i = 0; i < objects.objects.size(); ++i) {
+    note_allowed(objects.objects[i].object->allowed_links, &objects.allowed[i * objects.words]);
   }
 }
 
@@ -158,38 +143,35 @@ void WorldQuery::Impl::prepare_searches() {
   for (const LinkModel& link : robot->model->links) {
     nodes = std::max(nodes, link.tree.nodes().size());
   }
-  for (std::size_t w = 0; w < worlds.size(); ++w) {
-    if (!has_objects(w)) continue;
-    nodes = std::max(nodes, groups_of(w)->most_nodes);
-    if (groups_of(w)->open != nullptr) open = groups_of(w)->open;
+  for (const PosedObject& posed : objects.objects) {
+    const WorldShape& shape = *posed.object->shape;
+    nodes = std::max(nodes, shape.link.tree.nodes().size());
+    if (!shape.surface.opening_cells.empty()) open = &shape;
   }
   depth_queue.reserve((nodes + 1) * kSphereWidth);
-  for (ObjectSearch& search : searches) search.prepare(total, open);
+  for (ObjectSearch& search : searches) search.prepare(objects.objects.size(), open);
 }
 
-// Places the groups of frames that have moved, and their objects where these are placed.
+// Places the objects of frames that have moved.
 void WorldQuery::Impl::move_objects(Span<const PosedWorld* const> given) {
   double farthest = 0.0;
-  std::size_t g = 0;
+  auto next = objects.objects.begin();
   for (std::size_t w = 0; w < given.size(); ++w) {
-    if (!has_objects(w)) continue;  // its poses are anything
-    const std::vector<std::size_t>& first_group = groups_of(w)->first_group;
-    const std::size_t first = g;
-    g += groups_of(w)->groups.size();
-    for (std::size_t frame = 0; frame < worlds[w].X_FB.size(); ++frame) {
-      const Eigen::Isometry3d& X_FB = given[w]->X_FB[frame];
-      if (X_FB.matrix() == worlds[w].X_FB[frame].matrix()) continue;
-      const std::size_t end = first + first_group[frame + 1];
-      for (std::size_t i = first + first_group[frame]; i < end; ++i) {
-        farthest = std::max(farthest, objects.groups[i].moves_at_most(X_FB));
-      }
-      worlds[w].X_FB[frame] = X_FB;
-      for (std::size_t i = first + first_group[frame]; i < end; ++i) {
-        objects.groups[i].place();
-        if (objects.groups[i].first_placed != PosedGroup::kNotPlaced) {
-          objects.place(&objects.groups[i]);
-        }
-      }
+    if (!worlds[w].world) continue;  // its poses are anything
+    has_moved.assign(worlds[w].X_FB.size(), false);
+    for (std::size_t frame = 0; frame < has_moved.size(); ++frame) {
+      has_moved[frame] = given[w]->X_FB[frame].matrix() != worlds[w].X_FB[frame].matrix();
+      if (has_moved[frame]) worlds[w].X_FB[frame] = given[w]->X_FB[frame];
+    }
+    const auto end = next + static_cast<std::ptrdiff_t>(worlds[w].world->objects().size());
+    for (; next != end; ++next) {
+      const KnownWorld::Object& object = *next->object;
+      if (!has_moved[object.frame]) continue;
+      const Eigen::Isometry3d before = next->X_FO.X;
+      next->place(worlds[w].X_FB[object.frame] * object.X_BO);
+      farthest =
+          std::max(farthest, object.shape->surface.displacement.between(before, next->X_FO.X));
+      ++statistics.objects_placed;
     }
   }
   objects.path += farthest;
@@ -243,7 +225,6 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
   Impl& impl = *impl_;
   const std::size_t count = impl.searches.size();
   impl.statistics = {};
-  impl.objects.placed = 0;
   results->resize(count);
   for (LinkProximity& result : *results) result.reset();
   for (ObjectSearch& search : impl.searches) search.begin_unknown();
@@ -257,7 +238,7 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
                                   i < impl.link_margins.size() ? impl.link_margins[i] : 0.0,
                                   impl.influence_distance};
     ObjectSearch& search = impl.searches[i];
-    search.begin(X_FL[i], &impl.objects, question, &impl.statistics);
+    search.begin(X_FL[i], impl.objects, question, &impl.statistics);
     if (search.is_finished()) continue;
     if (is_limited) {
       impl.queue.push_back({search.lower_bound(), i});
@@ -270,7 +251,6 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
     impl.searches[i].report(&(*results)[i]);
     if (!impl.searches[i].is_finished()) impl.count_unfinished((*results)[i]);
   }
-  impl.statistics.objects_placed = impl.objects.placed;
   return impl.statistics.unfinished == 0;
 }
 

@@ -32,7 +32,6 @@ struct WorldLimits {
 /// The shape of an object, ready for queries.
 struct WorldShape;
 class ShapeCache;
-struct ObjectGroups;
 
 /// The objects of one source, ready for queries. Immutable, thread safe, shared by pointer.
 class KnownWorld {
@@ -54,15 +53,12 @@ class KnownWorld {
   /// Names of the frames that objects stand in, each once.
   const std::vector<std::string>& frames() const { return frames_; }
   std::size_t triangles() const { return triangles_; }  ///< of all objects
-  /// For the library's own use; null for a world without a builder, which is empty.
-  const ObjectGroups* groups() const { return groups_.get(); }
 
  private:
   friend class WorldBuilder;
   std::vector<Object> objects_;
   std::vector<std::string> frames_;
   std::size_t triangles_ = 0;
-  std::shared_ptr<const ObjectGroups> groups_;
 };
 
 /// A known world and where its frames are at one instant.

@@ -31,12 +31,11 @@ struct NearObject {
 
 /// Counts of a query's work, for tuning and tests.
 struct WorldQueryStatistics {
-  std::uint64_t objects_placed = 0;  ///< objects that were placed: new ones that are near, or moved
+  std::uint64_t objects_placed = 0;   ///< objects that are new or have moved
   std::uint64_t objects_bounded = 0;  ///< pairs of a link and an object whose boxes were compared
-  std::uint64_t groups_bounded = 0;   ///< pairs of a link and a group of objects
   std::uint64_t pairs_searched = 0;   ///< pairs of a link and an object that were measured
   std::uint64_t steps = 0;            ///< pairs of boxes and of parts that were looked at
-  std::uint64_t scans = 0;            ///< links for which all groups of objects were looked at
+  std::uint64_t scans = 0;            ///< links for which all objects were looked at
   std::uint64_t unfinished = 0;       ///< links that a deadline left wider than the tolerance
   double widest = 0.0;                ///< [m] see QueryStatistics
 };
