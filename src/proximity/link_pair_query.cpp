@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "internal/geometry/solid_queries.h"
+#include "proximity/link_pair_search.h"
 
 namespace ist {
 namespace {
@@ -13,8 +14,6 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // Pairs of boxes that the front may hold.
 constexpr std::size_t kFrontCapacity = 1024;
-// Distances that the search for the depth may measure, in each direction.
-constexpr int kDepthSteps = 100;
 
 double extent(const LinkModel& link) { return link.tree.center().norm() + link.tree.radius(); }
 
@@ -79,11 +78,11 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   depth_distance_ = kInf;
 }
 
-bool LinkPairQuery::advance(int* steps, std::vector<LinkPairSearch::Entry>* queue) {
+bool LinkPairQuery::advance(int* steps) {
   if (is_finished_) return true;
   if (!surfaces_.run({range_, config_.tolerance, config_.relative_tolerance}, steps)) return false;
   decide_contact(steps);
-  if (!are_apart_) search_spheres(queue);
+  if (!are_apart_) search_spheres();
   if (are_in_contact_) measure_depth();
   if (!are_apart_ && are_closed_) bound_by_slabs();
   is_finished_ = true;
@@ -140,14 +139,14 @@ bool LinkPairQuery::find_inside_point() {
 // Bounds the depth by the spheres of both, also where it is not decided whether there is one: less
 // than a nanometre from touch, or where a surface is next to an opening. A point that is found
 // inside both decides that.
-void LinkPairQuery::search_spheres(std::vector<LinkPairSearch::Entry>* queue) {
+void LinkPairQuery::search_spheres() {
   QueryConfig config = config_;
   config.max_distance = range_;
-  LinkPairSearch of_a(a_, b_, X_BA_, config, queue);
-  of_a.run(kDepthSteps);
+  LinkPairSearch of_a(a_, b_, X_BA_, config);
+  of_a.run();
   keep_deeper(of_a.p_BCa(), of_a.closest(), true);
-  LinkPairSearch of_b(b_, a_, X_BA_.inverse(), config, queue);
-  of_b.run(kDepthSteps);
+  LinkPairSearch of_b(b_, a_, X_BA_.inverse(), config);
+  of_b.run();
   keep_deeper(X_BA_ * of_b.p_BCa(), of_b.closest(), false);
   depth_bound_ = std::min(of_a.lower_bound(), of_b.lower_bound());
   // No point of either is inside the other.

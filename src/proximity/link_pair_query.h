@@ -1,11 +1,9 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <vector>
 
 #include "internal/geometry/relative_pose.h"
 #include "ist_proximity/proximity/self_query.h"
-#include "proximity/link_pair_search.h"
 #include "proximity/link_surface.h"
 #include "proximity/opening_search.h"
 #include "proximity/surface_pair_search.h"
@@ -28,9 +26,8 @@ class LinkPairQuery {
 
   /// Goes on until the tolerance is reached.
   /// @param steps  how many pairs of boxes may be looked at; reduced by those that were
-  /// @param queue  scratch for depths, reserved by the caller
   /// @returns false when the steps were used up first
-  bool advance(int* steps, std::vector<LinkPairSearch::Entry>* queue);
+  bool advance(int* steps);
 
   /// [m] Proven at this pose, whatever has been done so far; the margin is not taken off.
   double lower_bound() const;
@@ -43,7 +40,7 @@ class LinkPairQuery {
   void decide_contact(int* steps);
   bool are_hulls_apart();
   bool find_inside_point();
-  void search_spheres(std::vector<LinkPairSearch::Entry>* queue);
+  void search_spheres();
   void measure_depth();
   void measure_depth_at(const Eigen::Vector3d& q_B, bool is_of_a);
   void keep_deeper(const Eigen::Vector3d& q_B, const SignedDistance& found, bool is_of_a);

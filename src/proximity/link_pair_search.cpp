@@ -13,23 +13,19 @@ constexpr int kMaxProjections = 20;
 }  // namespace
 
 LinkPairSearch::LinkPairSearch(const LinkModel& a, const LinkModel& b,
-                               const Eigen::Isometry3d& X_BA, const QueryConfig& config,
-                               std::vector<Entry>* queue)
+                               const Eigen::Isometry3d& X_BA, const QueryConfig& config)
     : a_(a),
       b_(b),
       X_BA_(X_BA),
       X_AB_(X_BA.inverse()),
       config_(config),
-      has_holes_(!a.solid.is_closed() || !b.solid.is_closed()),
-      queue_(*queue) {}
+      has_holes_(!a.solid.is_closed() || !b.solid.is_closed()) {}
 
-void LinkPairSearch::run(int max_steps) {
-  queue_.clear();
+void LinkPairSearch::run() {
   push(a_.tree.center(), a_.tree.radius(), 0);
-  while (!queue_.empty() && queue_.front().bound < prune_bound() && max_steps-- > 0) {
-    std::pop_heap(queue_.begin(), queue_.end());
-    const std::int32_t child = queue_.back().child;
-    queue_.pop_back();
+  for (int step = 0; step < kMaxSteps && size_ > 0 && queue_[0].bound < prune_bound(); ++step) {
+    std::pop_heap(queue_.begin(), queue_.begin() + size_);
+    const std::int32_t child = queue_[--size_].child;
     if (child < 0) {
       visit_leaf(a_.tree.leaves()[static_cast<std::size_t>(~child)]);
       continue;
@@ -39,7 +35,7 @@ void LinkPairSearch::run(int max_steps) {
       push({node.x[k], node.y[k], node.z[k]}, node.radius[k], node.child[k]);
     }
   }
-  if (!queue_.empty()) prune(queue_.front().bound);
+  if (size_ > 0) prune(queue_[0].bound);
   lower_bound_ = std::min(lower_bound_, closest_.distance);
   lower_bound_ -= interior_allowance();
 }
@@ -78,8 +74,8 @@ void LinkPairSearch::push(const Eigen::Vector3d& p_A, double radius, std::int32_
     bound = distance_floor(b_.solid, p_B, b_.solid.signed_distance(p_B)) - radius;
   }
   if (bound >= prune_bound()) return prune(bound);
-  queue_.push_back({bound, child});
-  std::push_heap(queue_.begin(), queue_.end());
+  queue_[size_++] = {bound, child};
+  std::push_heap(queue_.begin(), queue_.begin() + size_);
 }
 
 // A part that is not visited counts with its bound: the prune bound falls later on.

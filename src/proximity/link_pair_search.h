@@ -2,9 +2,10 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <vector>
 
 #include "ist_proximity/geometry/solid.h"
 #include "ist_proximity/proximity/proximity_query.h"
@@ -17,6 +18,19 @@ namespace ist {
 /// and alternating projections for the upper bound.
 class LinkPairSearch {
  public:
+  /// @param config  outlives the search; max_distance and tolerance are read
+  LinkPairSearch(const LinkModel& a, const LinkModel& b, const Eigen::Isometry3d& X_BA,
+                 const QueryConfig& config);
+
+  /// Visits so many parts and spheres that memory for them is at hand; the bounds of others count.
+  void run();
+
+  double lower_bound() const { return lower_bound_; }         ///< [m]
+  const Eigen::Vector3d& p_BCa() const { return p_BCa_; }     ///< [m] of A, in B's frame
+  const SignedDistance& closest() const { return closest_; }  ///< of that point to B
+
+ private:
+  static constexpr int kMaxSteps = 100;
   /// A part of A's tree that is still to be visited.
   struct Entry {
     double bound;        ///< [m] lower bound of the distance of the points of A that it covers
@@ -24,19 +38,6 @@ class LinkPairSearch {
     bool operator<(const Entry& other) const { return bound > other.bound; }  ///< least on top
   };
 
-  /// @param config  outlives the search; max_distance and tolerance are read
-  /// @param queue   scratch that is reused
-  LinkPairSearch(const LinkModel& a, const LinkModel& b, const Eigen::Isometry3d& X_BA,
-                 const QueryConfig& config, std::vector<Entry>* queue);
-
-  /// @param max_steps  parts and spheres that may be visited; the bounds of the others count
-  void run(int max_steps);
-
-  double lower_bound() const { return lower_bound_; }         ///< [m]
-  const Eigen::Vector3d& p_BCa() const { return p_BCa_; }     ///< [m] of A, in B's frame
-  const SignedDistance& closest() const { return closest_; }  ///< of that point to B
-
- private:
   double interior_allowance() const;
   double prune_bound() const;
   double cover_bound(const Eigen::Vector3d& p_B, double radius) const;
@@ -51,7 +52,8 @@ class LinkPairSearch {
   const Eigen::Isometry3d X_BA_, X_AB_;
   const QueryConfig& config_;
   const bool has_holes_;
-  std::vector<Entry>& queue_;  // a heap
+  std::array<Entry, 1 + kMaxSteps * kSphereWidth> queue_;  // a heap
+  std::size_t size_ = 0;                                   // of it
   double lower_bound_ = std::numeric_limits<double>::infinity();
   SignedDistance closest_;  // of p_BCa_
   Eigen::Vector3d p_BCa_ = Eigen::Vector3d::Zero();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
 namespace ist {
@@ -32,7 +33,7 @@ void PosedObject::place(const Eigen::Isometry3d& X_FO_given) {
 }
 
 ObjectSearch::ObjectSearch(const RobotSurfaces& robot, std::size_t link)
-    : link_(link), model_(robot.model->links[link]), surface_(robot.surfaces[link].get()) {
+    : model_(robot.model->links[link]), surface_(robot.surfaces[link].get()) {
   if (surface_ == nullptr) return;
   const Eigen::AlignedBox3d& box = surface_->box;
   center_L_ = box.center();
@@ -140,8 +141,10 @@ void ObjectSearch::list_objects() {
     const PosedObject& object = objects_->objects[i];
     const double reach = range + kListSlack + object.object->margin;
     const double apart = (center_F_ - object.center_F).norm() - radius_ - object.radius;
-    if (less_errors(apart, object) >= reach || objects_->is_allowed(i, link_)) continue;
-    if (box_bound(object) < reach) list_.push_back(static_cast<std::uint32_t>(i));
+    if (less_errors(apart, object) >= reach || box_bound(object) >= reach) continue;
+    const std::vector<std::string>& allowed = object.object->allowed_links;
+    if (std::find(allowed.begin(), allowed.end(), model_.name) != allowed.end()) continue;
+    list_.push_back(static_cast<std::uint32_t>(i));
   }
   X_FL_of_list_ = X_FL_.X;
   path_of_list_ = objects_->path;
@@ -202,7 +205,7 @@ void ObjectSearch::activate(const Candidate& candidate) {
   ++statistics_->pairs_searched;
 }
 
-bool ObjectSearch::advance(int steps, std::vector<LinkPairSearch::Entry>* depth_queue) {
+bool ObjectSearch::advance(int steps) {
   while (!is_finished_) {
     if (current_ == nullptr) {
       if (candidates_.empty() || candidates_.front().bound >= stop_bound()) {
@@ -215,7 +218,7 @@ bool ObjectSearch::advance(int steps, std::vector<LinkPairSearch::Entry>* depth_
       activate(candidate);
     }
     const int before = steps;
-    const bool is_measured = current_->query->advance(&steps, depth_queue);
+    const bool is_measured = current_->query->advance(&steps);
     statistics_->steps += static_cast<std::uint64_t>(before - steps);
     if (!is_measured) return false;
     take_result();

@@ -31,14 +31,8 @@ struct PosedObject {
 /// All objects of a query.
 struct PosedObjects {
   std::vector<PosedObject> objects;
-  std::vector<std::uint64_t> allowed;  ///< by object: `words` of bits, one for each link
-  std::size_t words = 0;
   double path = 0.0;             ///< [m] no object has moved farther, all motions added
   std::uint64_t generation = 0;  ///< another one whenever the objects are others
-
-  bool is_allowed(std::size_t object, std::size_t link) const {
-    return (allowed[object * words + link / 64] >> (link % 64) & 1U) != 0;
-  }
 };
 
 /// The question to one link.
@@ -68,9 +62,8 @@ class ObjectSearch {
   /// The link is UNKNOWN.
   void begin_unknown();
   /// Goes on until the tolerance is reached.
-  /// @param depth_queue  scratch
   /// @returns false when the steps were used up first
-  bool advance(int steps, std::vector<LinkPairSearch::Entry>* depth_queue);
+  bool advance(int steps);
   /// [m] What is proven so far, margins taken off.
   double lower_bound() const;
   bool is_finished() const { return is_finished_; }
@@ -103,7 +96,6 @@ class ObjectSearch {
   void take_distance(const PairProximity& found);
   LinkProximity answer_of(const PairProximity& found, const PosedObject& object) const;
 
-  const std::size_t link_;
   const LinkModel& model_;
   const LinkSurface* surface_;  // null: the link is not usable
   Eigen::Vector3d center_L_, half_L_;

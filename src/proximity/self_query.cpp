@@ -50,27 +50,23 @@ struct SelfQuery::Impl {
   std::vector<std::unique_ptr<LinkPairQuery>> queries;  // by pair; null where a link is unusable
   std::vector<RigidPose> X_FL;                          // by link
   std::vector<Waiting> queue;                           // a heap
-  std::vector<LinkPairSearch::Entry> depth_queue;       // scratch
 };
 
 void SelfQuery::Impl::prepare(const CancelRequest& cancelled) {
   const auto& links = model->links;
   surfaces.resize(links.size());
   X_FL.resize(links.size());
-  std::size_t entries = 0;
   for (const LinkPair& pair : pairs) {
     queries.emplace_back();
     if (std::max(pair.first, pair.second) >= links.size()) continue;
     if (!can_query(links[pair.first]) || !can_query(links[pair.second])) continue;
     for (const std::size_t i : {pair.first, pair.second}) {
       if (!surfaces[i]) surfaces[i] = LinkSurface::of(links[i], cancelled);
-      entries = std::max(entries, (links[i].tree.nodes().size() + 1) * kSphereWidth);
     }
     queries.back() = std::make_unique<LinkPairQuery>(links[pair.first], links[pair.second],
                                                      *surfaces[pair.first], *surfaces[pair.second]);
   }
   queue.reserve(pairs.size());
-  depth_queue.reserve(entries);
 }
 
 SelfQuery::SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
@@ -98,7 +94,7 @@ const SelfQueryStatistics& SelfQuery::statistics() const { return impl_->statist
 
 bool SelfQuery::Impl::finish(std::size_t pair, int steps) {
   int left = steps;
-  const bool finished = queries[pair]->advance(&left, &depth_queue);
+  const bool finished = queries[pair]->advance(&left);
   statistics.steps += static_cast<std::uint64_t>(steps - left);
   return finished;
 }

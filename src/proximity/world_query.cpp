@@ -1,6 +1,7 @@
 #include "ist_proximity/proximity/world_query.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -13,6 +14,7 @@ namespace {
 
 // Pairs of boxes that a link looks at before the clock is read: some tens of microseconds.
 constexpr int kSlice = 256;
+constexpr double kInf = std::numeric_limits<double>::infinity();
 // [m] The path is counted anew after this length, so that it keeps its digits.
 constexpr double kLongestPath = 1e4;
 
@@ -52,7 +54,6 @@ struct WorldQuery::Impl {
   bool take_worlds(Span<const PosedWorld* const> given);
   void list_objects(Span<const PosedWorld* const> given);
   void prepare_searches();
-  void note_allowed(const std::vector<std::string>& names, std::uint64_t* bits) const;
   void move_objects(Span<const PosedWorld* const> given);
   void finish_by(Deadline* deadline);
   void count_unfinished(const LinkProximity& result);
@@ -67,7 +68,6 @@ struct WorldQuery::Impl {
   std::vector<bool> has_moved;         // scratch: by frame of a world
   std::vector<ObjectSearch> searches;  // by link
   std::vector<Waiting> queue;          // a heap
-  std::vector<LinkPairSearch::Entry> depth_queue;
 };
 
 WorldQuery::WorldQuery(std::shared_ptr<const RobotSurfaces> robot, const QueryConfig& config)
@@ -78,7 +78,6 @@ WorldQuery::WorldQuery(std::shared_ptr<const RobotSurfaces> robot, const QueryCo
   impl_->searches.reserve(links);
   for (std::size_t i = 0; i < links; ++i) impl_->searches.emplace_back(*impl_->robot, i);
   impl_->queue.reserve(links);
-  impl_->objects.words = (links + 63) / 64;
 }
 WorldQuery::~WorldQuery() = default;
 WorldQuery::WorldQuery(WorldQuery&&) noexcept = default;
@@ -102,15 +101,6 @@ bool WorldQuery::is_finished(std::size_t link) const {
   return link < impl_->searches.size() && impl_->searches[link].is_finished();
 }
 
-void WorldQuery::Impl::note_allowed(const std::vector<std::string>& names,
-                                    std::uint64_t* bits) const {
-  const auto& links = robot->model->links;
-  for (std::size_t i = 0; i < links.size(); ++i) {
-    if (std::find(names.begin(), names.end(), links[i].name) == names.end()) continue;
-    bits[i / 64] |= std::uint64_t{1} << (i % 64);
-  }
-}
-
 void WorldQuery::Impl::list_objects(Span<const PosedWorld* const> given) {
   objects.objects.clear();
   ++objects.generation;
@@ -130,25 +120,15 @@ void WorldQuery::Impl::list_objects(Span<const PosedWorld* const> given) {
     }
   }
   statistics.objects_placed = objects.objects.size();
-  objects.allowed.assign(objects.words * objects.objects.size(), 0);
-  for (std::size_t i = 0; i < objects.objects.size(); ++i) {
-    note_allowed(objects.objects[i].object->allowed_links, &objects.allowed[i * objects.words]);
-  }
 }
 
 // Memory for the searches of all links.
 void WorldQuery::Impl::prepare_searches() {
   const WorldShape* open = nullptr;
-  std::size_t nodes = 0;
-  for (const LinkModel& link : robot->model->links) {
-    nodes = std::max(nodes, link.tree.nodes().size());
-  }
   for (const PosedObject& posed : objects.objects) {
     const WorldShape& shape = *posed.object->shape;
-    nodes = std::max(nodes, shape.link.tree.nodes().size());
     if (!shape.surface.opening_cells.empty()) open = &shape;
   }
-  depth_queue.reserve((nodes + 1) * kSphereWidth);
   for (ObjectSearch& search : searches) search.prepare(objects.objects.size(), open);
 }
 
@@ -167,10 +147,11 @@ void WorldQuery::Impl::move_objects(Span<const PosedWorld* const> given) {
     for (; next != end; ++next) {
       const KnownWorld::Object& object = *next->object;
       if (!has_moved[object.frame]) continue;
-      const Eigen::Isometry3d before = next->X_FO.X;
+      const RigidPose before = next->X_FO;
       next->place(worlds[w].X_FB[object.frame] * object.X_BO);
-      farthest =
-          std::max(farthest, object.shape->surface.displacement.between(before, next->X_FO.X));
+      const double moved = object.shape->surface.displacement.between(before.X, next->X_FO.X) +
+                           (before.drift + next->X_FO.drift) * next->extent;
+      if (!(moved <= farthest)) farthest = std::isnan(moved) ? kInf : moved;
       ++statistics.objects_placed;
     }
   }
@@ -206,7 +187,7 @@ void WorldQuery::Impl::finish_by(Deadline* deadline) {
     std::pop_heap(queue.begin(), queue.end());
     const std::size_t link = queue.back().link;
     queue.pop_back();
-    if (searches[link].advance(kSlice, &depth_queue)) continue;
+    if (searches[link].advance(kSlice)) continue;
     queue.push_back({searches[link].lower_bound(), link});
     std::push_heap(queue.begin(), queue.end());
   }
@@ -243,7 +224,7 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
     if (is_limited) {
       impl.queue.push_back({search.lower_bound(), i});
     } else {
-      search.advance(std::numeric_limits<int>::max(), &impl.depth_queue);
+      search.advance(std::numeric_limits<int>::max());
     }
   }
   if (is_limited) impl.finish_by(&deadline);
