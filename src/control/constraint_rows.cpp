@@ -4,36 +4,19 @@
 #include <cmath>
 
 #include "control/row_config.h"
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/solid_queries.h"
 #include "ist_proximity/robot/link_poses.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kBoxPadding = 1e-6;  // [m] more than rounding of supports and poses
 constexpr double kRounding = 1e-9;    // share taken off limits, for the rounding of sums
 constexpr double kGrowth = 0.1;       // [m] by which levers may grow within a certified radius
 
 bool moves(const Kinematics::Joint& joint) {
   return joint.type != JointType::kFixed && !joint.has_unstated_pose();
-}
-
-// The corners of a box about all of a link's geometry, in the link's frame.
-std::array<Eigen::Vector3d, 8> box_corners(const LinkModel& link) {
-  Eigen::AlignedBox3d box(Eigen::Vector3d::Zero());
-  if (link.usable() && !link.solid.empty()) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::Vector3d n = Eigen::Vector3d::Unit(axis);
-      box.max()[axis] = support(link.solid, n) + kBoxPadding;
-      box.min()[axis] = -support(link.solid, -n) - kBoxPadding;
-    }
-  }
-  std::array<Eigen::Vector3d, 8> corners;
-  for (std::size_t k = 0; k < corners.size(); ++k) {
-    corners[k] = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k));
-  }
-  return corners;
 }
 
 // [m/s] The largest rate of approach to the nearest obstacle.
@@ -51,7 +34,28 @@ double free_motion(const RowConfig& config, double bound) {
 
 }  // namespace
 
+std::vector<LinkBox> link_boxes(const RobotModel& model) {
+  std::vector<LinkBox> boxes;
+  for (const LinkModel& link : model.links) {
+    Eigen::AlignedBox3d box;
+    if (link.usable() && !link.solid.empty()) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const Eigen::Vector3d n = Eigen::Vector3d::Unit(axis);
+        box.max()[axis] = support(link.solid, n) + kBoxPadding;
+        box.min()[axis] = -support(link.solid, -n) - kBoxPadding;
+      }
+    }
+    boxes.push_back({link.name, box});
+  }
+  return boxes;
+}
+
 ConstraintRowBuilder::ConstraintRowBuilder(const RobotModel& model,
+                                           std::shared_ptr<const Kinematics> kinematics,
+                                           std::vector<LinkPair> pairs, std::size_t capacity)
+    : ConstraintRowBuilder(link_boxes(model), std::move(kinematics), std::move(pairs), capacity) {}
+
+ConstraintRowBuilder::ConstraintRowBuilder(const std::vector<LinkBox>& links,
                                            std::shared_ptr<const Kinematics> kinematics,
                                            std::vector<LinkPair> pairs, std::size_t capacity)
     : kinematics_(std::move(kinematics)), pairs_(std::move(pairs)) {
@@ -62,9 +66,16 @@ ConstraintRowBuilder::ConstraintRowBuilder(const RobotModel& model,
     column_[j] = static_cast<Eigen::Index>(joints_.size());
     joints_.push_back(j);
   }
-  for (const LinkModel& link : model.links) {
-    const auto body = kinematics_->find_body(link.name);
-    links_.push_back({body ? *body : kinematics_->bodies().size(), box_corners(link)});
+  for (const LinkBox& link : links) {
+    const auto body = kinematics_->find_body(link.link);
+    // The origin is in every box: it is where a link without geometry is.
+    Eigen::AlignedBox3d box(Eigen::Vector3d::Zero());
+    box.extend(link.box_L);
+    Corners corners_B;
+    for (std::size_t k = 0; k < corners_B.size(); ++k) {
+      corners_B[k] = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k));
+    }
+    links_.push_back({body ? *body : kinematics_->bodies().size(), corners_B});
   }
   if (capacity == 0) capacity = 3 * links_.size() + pairs_.size();
   const auto rows = static_cast<Eigen::Index>(capacity);
@@ -237,10 +248,10 @@ void ConstraintRowBuilder::add(const Answer& answer, const Body& first, const Bo
   const auto row = static_cast<Eigen::Index>(rows_.count);
   RowOrigin& origin = rows_.origins[rows_.count++];
   origin = answer.origin;
-  rows_.h[row] = kInf;
+  rows_.h[row] = kInfinity;
   rows_.radius[row] = rows_.sweep_limit[row] = 0.0;
   rows_.sweep.row(row) = unit_levers_.transpose();
-  if (!has_bodies || origin.state == LinkState::kUnknown || !(origin.bound > -kInf)) {
+  if (!has_bodies || origin.state == LinkState::kUnknown || !(origin.bound > -kInfinity)) {
     origin.state = LinkState::kUnknown;
     rows_.G.row(row).setZero();
     return;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kViolation = 1e-10;  // that counts, relative to the velocity or to 1
 // Normals nearer to the span of the active ones than this, as a sine, depend on them.
 constexpr double kDependent = 1e-8;
@@ -135,7 +135,7 @@ bool NearestVelocity::take_in(const ActiveBound& bound) {
       R_.topLeftCorner(count_, count_).triangularView<Eigen::Upper>().solveInPlace(rates);
     }
     const double left_sq = step_.squaredNorm();
-    double dual = kInf;
+    double dual = kInfinity;
     Eigen::Index dropped = -1;
     for (Eigen::Index j = 0; j < count_; ++j) {
       if (rates_[j] > kDependent && multipliers_[j] / rates_[j] < dual) {
@@ -144,9 +144,9 @@ bool NearestVelocity::take_in(const ActiveBound& bound) {
       }
     }
     const bool is_free = left_sq > kDependent * kDependent && count_ < x_.size();
-    const double primal = is_free ? std::max(normal_.dot(y_) - limit_, 0.0) / left_sq : kInf;
+    const double primal = is_free ? std::max(normal_.dot(y_) - limit_, 0.0) / left_sq : kInfinity;
     const double length = std::min(dual, primal);
-    if (length == kInf) return false;
+    if (length == kInfinity) return false;
     multiplier += length;
     multipliers_.head(count_) -= length * rates_.head(count_);
     if (is_free) {

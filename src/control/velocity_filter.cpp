@@ -3,18 +3,17 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "control/nearest_velocity.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double kInf = std::numeric_limits<double>::infinity();
 // [m/s, rad/s] What an answer may exceed a bound by: rounding.
-constexpr double kRounding = 1e-9;
+constexpr double kNegligible = 1e-9;
 
 void check(bool holds, const char* name, std::size_t joint, double value, const char* allowed) {
   if (holds) return;
@@ -36,16 +35,17 @@ bool is_finite(Span<const double> values) {
 // Whether numbers and signs are those that ConstraintRows states.
 bool can_be_used(const ConstraintRows& rows, Eigen::Index joints) {
   const auto count = static_cast<Eigen::Index>(rows.count);
-  const bool fits = rows.is_complete && rows.horizon > 0.0 && rows.horizon < kInf &&
+  const bool fits = rows.is_complete && rows.horizon > 0.0 && rows.horizon < kInfinity &&
                     rows.G.cols() == joints && rows.sweep.cols() == joints &&
                     rows.G.rows() >= count && rows.sweep.rows() >= count &&
                     rows.h.size() >= count && rows.sweep_limit.size() >= count;
   if (!fits) return false;
   for (Eigen::Index i = 0; i < count; ++i) {
-    if (std::isnan(rows.h[i]) || rows.h[i] == -kInf || !(rows.sweep_limit[i] >= 0.0)) return false;
+    if (std::isnan(rows.h[i]) || rows.h[i] == -kInfinity || !(rows.sweep_limit[i] >= 0.0))
+      return false;
     for (Eigen::Index k = 0; k < joints; ++k) {
       const double sweep = rows.sweep(i, k);
-      if (!std::isfinite(rows.G(i, k)) || !(sweep >= 0.0 && sweep < kInf)) return false;
+      if (!std::isfinite(rows.G(i, k)) || !(sweep >= 0.0 && sweep < kInfinity)) return false;
     }
   }
   return true;
@@ -72,7 +72,7 @@ JointLimits joint_limits(const Kinematics& kinematics, double speed) {
   JointLimits limits;
   for (const Kinematics::Joint& joint : kinematics.joints()) {
     if (!joint.is_free()) continue;
-    limits.speed.push_back(speed);
+    limits.speed.push_back(std::min(speed, joint.speed));
     limits.lower.push_back(joint.lower);
     limits.upper.push_back(joint.upper);
   }
@@ -86,9 +86,9 @@ struct VelocityFilter::Impl {
         joints(static_cast<Eigen::Index>(limits.speed.size())),
         solver(joints) {
     const std::size_t count = limits.speed.size();
-    if (limits.lower.empty()) limits.lower.assign(count, -kInf);
-    if (limits.upper.empty()) limits.upper.assign(count, kInf);
-    if (limits.acceleration.empty()) limits.acceleration.assign(count, kInf);
+    if (limits.lower.empty()) limits.lower.assign(count, -kInfinity);
+    if (limits.upper.empty()) limits.upper.assign(count, kInfinity);
+    if (limits.acceleration.empty()) limits.acceleration.assign(count, kInfinity);
     if (given_weights.empty()) given_weights.assign(count, 1.0);
     check_size(limits.lower, "lower", count);
     check_size(limits.upper, "upper", count);
@@ -100,10 +100,10 @@ struct VelocityFilter::Impl {
             "more than 0");
       check(limits.upper[k] >= limits.lower[k], "upper limit", k, limits.upper[k],
             "no less than the lower one");
-      check(given_weights[k] > 0.0 && given_weights[k] < kInf, "weight", k, given_weights[k],
+      check(given_weights[k] > 0.0 && given_weights[k] < kInfinity, "weight", k, given_weights[k],
             "more than 0 and finite");
     }
-    if (!(period > 0.0 && period < kInf)) {
+    if (!(period > 0.0 && period < kInfinity)) {
       throw std::invalid_argument("period is " + std::to_string(period) +
                                   " s; it must be more than 0 s");
     }
@@ -164,14 +164,14 @@ struct VelocityFilter::Impl {
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows.count); ++i) {
       if (rows.sweep_limit[i] > 0.0) continue;
       for (Eigen::Index k = 0; k < joints; ++k) {
-        if (rows.sweep(i, k) > 0.0 && std::abs(x[k]) < kRounding) x[k] = 0.0;
+        if (rows.sweep(i, k) > 0.0 && std::abs(x[k]) < kNegligible) x[k] = 0.0;
       }
     }
   }
 
   // Whether the velocity x meets the rows, to rounding.
   bool is_met(const ConstraintRows& rows) const {
-    const double slack = kRounding * (1.0 + x.lpNorm<1>());
+    const double slack = kNegligible * (1.0 + x.lpNorm<1>());
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows.count); ++i) {
       double approach = 0.0, sweep = 0.0;
       for (Eigen::Index k = 0; k < joints; ++k) {

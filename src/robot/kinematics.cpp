@@ -50,6 +50,7 @@ Kinematics::Joint make_joint(const JointDescription& description, std::size_t pa
   }
   joint.lower = description.lower;
   joint.upper = description.upper;
+  joint.speed = description.speed;
   joint.source = index;
   joint.multiplier = 1.0;
   joint.offset = 0.0;

@@ -224,6 +224,7 @@ void write(const JointDescription& joint, Writer* out) {
   }
   out->number(joint.lower);
   out->number(joint.upper);
+  out->number(joint.speed);
 }
 
 JointDescription read_joint(Reader* in) {
@@ -247,6 +248,7 @@ JointDescription read_joint(Reader* in) {
   }
   joint.lower = in->number();
   joint.upper = in->number();
+  joint.speed = in->number();
   return joint;
 }
 

@@ -71,6 +71,7 @@ JointDescription to_joint(const urdf::Joint& joint) {
     if (std::abs(joint.limits->lower) <= kMaxLength) result.lower = joint.limits->lower;
     if (std::abs(joint.limits->upper) <= kMaxLength) result.upper = joint.limits->upper;
   }
+  if (joint.limits && joint.limits->velocity > 0.0) result.speed = joint.limits->velocity;
   if (joint.mimic) {
     result.mimic = Mimic{joint.mimic->joint_name, joint.mimic->multiplier, joint.mimic->offset};
   }

@@ -103,6 +103,15 @@ struct ConstraintRows {
   bool is_complete = false;
 };
 
+/// A box about all of a link's geometry, attached objects included.
+struct LinkBox {
+  std::string link;           ///< name in the URDF
+  Eigen::AlignedBox3d box_L;  ///< [m] in the link's frame; empty: the link's origin alone
+};
+
+/// The boxes of all links, in the model's order.
+std::vector<LinkBox> link_boxes(const RobotModel& model);
+
 /// Makes ConstraintRows from the answers of one instant. Links that joints cannot move have no row.
 /// Floating and planar joints count as standing still, and so do objects that the robot carries:
 /// these want a speed. It allocates nothing after construction, locks nothing and never throws. One
@@ -114,6 +123,10 @@ class ConstraintRowBuilder {
   /// @param pairs       of SelfQuery::pairs(); may be empty
   /// @param capacity    rows at most; 0: three for each link and one for each pair
   ConstraintRowBuilder(const RobotModel& model, std::shared_ptr<const Kinematics> kinematics,
+                       std::vector<LinkPair> pairs = {}, std::size_t capacity = 0);
+  /// The same for links of which no more than a box is known, such as those of a message.
+  ConstraintRowBuilder(const std::vector<LinkBox>& links,
+                       std::shared_ptr<const Kinematics> kinematics,
                        std::vector<LinkPair> pairs = {}, std::size_t capacity = 0);
 
   /// Starts anew.

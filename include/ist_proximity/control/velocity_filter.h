@@ -20,7 +20,7 @@ struct JointLimits {
   std::vector<double> acceleration;  ///< [rad/s^2, m/s^2] > 0, may be +inf; empty: none
 };
 
-/// The limits that a URDF states for positions, with one speed for all joints.
+/// The limits that a URDF states, and a speed [rad/s, m/s] that no joint exceeds.
 JointLimits joint_limits(const Kinematics& kinematics, double speed);
 
 /// The outcome of a command.

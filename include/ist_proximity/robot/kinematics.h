@@ -51,6 +51,7 @@ class Kinematics {
     Eigen::Vector3d axis;    ///< unit, in J
     double lower;            ///< [rad, m] limit, may be -inf
     double upper;            ///< [rad, m] limit, may be +inf
+    double speed;            ///< [rad/s, m/s] limit, may be +inf
     std::size_t source;      ///< joint whose position moves this one; itself unless it mimics
     double multiplier;       ///< factor of the source's position, over the whole chain of mimics
     double offset;           ///< [rad, m] added to that product

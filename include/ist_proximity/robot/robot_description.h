@@ -36,6 +36,8 @@ struct JointDescription {
   double lower = -std::numeric_limits<double>::infinity();
   /// [rad, m] upper limit; +inf where the joint has none
   double upper = std::numeric_limits<double>::infinity();
+  /// [rad/s, m/s] limit; +inf where the joint has none, or 0
+  double speed = std::numeric_limits<double>::infinity();
 };
 
 /// The elements of a URDF that a link's shapes are read from.
