@@ -258,63 +258,6 @@ class Plot(Drawing):
         return self.whole()
 
 
-class GrowthPlot(Drawing):
-    """Median and 99th percentile of a query against what grows: four panels, axes logarithmic."""
-
-    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM, GAP = 860, 330, 70, 20, 60, 50, 22
-    PANELS = (("spheres", "spheres"), ("points", "points"), ("links", "links"),
-              ("distance", "distance [m]"))
-    COLOURS = {0.0: ("exact", "#c0392b"), 1.0: ("to 1 mm", "#2980b9")}  # by tolerance [mm]
-
-    def __init__(self, rows, title):
-        super().__init__(rows, title)
-        times = [r[key] for r in rows for key in ("query_us", "query_p99_us")]
-        self.y = (math.log10(min(times)) - 0.1, math.log10(max(times)) + 0.1)
-
-    def line(self, points, colour, extra=""):
-        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-        self.parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}"{extra}/>')
-
-    def panel(self, number, what, words):
-        width = (self.WIDTH - self.LEFT - self.RIGHT) / len(self.PANELS)
-        left, right = self.LEFT + number * width, self.LEFT + (number + 1) * width - self.GAP
-        rows = [r for r in self.rows if r["what"] == what]
-        values = sorted({r["value"] for r in rows})
-        low, high = math.log10(values[0]), math.log10(values[-1])
-        bottom = self.HEIGHT - self.BOTTOM
-
-        def px(value):
-            return left + (math.log10(value) - low) / (high - low) * (right - left)
-
-        for decade in range(math.ceil(self.y[0]), math.floor(self.y[1]) + 1):
-            y = self.py(10.0 ** decade)
-            self.line([(left, y), (right, y)], "#ddd")
-            if number == 0:
-                self.text(left - 8, y + 4, time(10.0 ** decade).replace(".0", ""), "end")
-        for value in (values[0], values[-1]):
-            self.line([(px(value), self.TOP), (px(value), bottom)], "#ddd")
-            anchor = "start" if value == values[0] else "end"
-            self.text(px(value), bottom + 18, f"{value:,.0f}" if value >= 1 else f"{value:g}",
-                      anchor)
-        self.text((left + right) / 2, self.HEIGHT - 12, words)
-        for tolerance, (_, colour) in self.COLOURS.items():
-            of = sorted((r for r in rows if r["tolerance_mm"] == tolerance),
-                        key=lambda r: r["value"])
-            self.line([(px(r["value"]), self.py(r["query_us"])) for r in of], colour,
-                      ' stroke-width="2"')
-            self.line([(px(r["value"]), self.py(r["query_p99_us"])) for r in of], colour,
-                      ' stroke-dasharray="3 3"')
-
-    def svg(self):
-        for number, (what, words) in enumerate(self.PANELS):
-            self.panel(number, what, words)
-        self.text(self.WIDTH / 2, 22, self.title, extra=' font-weight="bold"')
-        for number, (words, colour) in enumerate(self.COLOURS.values()):
-            self.text(self.LEFT + 270 * number, 44, f"{words}: median (99th percentile dashed)",
-                      "start", colour)
-        return self.whole()
-
-
 def fill(path, parts):
     """Replaces the text between the markers. Markers that the document lacks are skipped."""
     text = path.read_text(encoding="utf-8")
@@ -349,24 +292,20 @@ def report_hard(arguments, run):
 
 
 def report_peers(arguments, run):
-    peers, growth = (read(path) for path in arguments.results[:2])
+    peers = read(arguments.results[0])
     write(arguments.folder / "benchmark.csv", peers, arguments)
-    write(arguments.folder / "benchmark_growth.csv", growth, arguments)
     shown = [r for r in peers if r["data"] == "kinect"] or peers
-    parts = {"benchmark run": run, "benchmark short": short_table(shown), **sections(arguments.results[2])}
+    parts = {"benchmark run": run, "benchmark short": short_table(shown)}
     fill(arguments.folder / "benchmark.md", parts)
     title = f"Speed against error: {NAMES[shown[0]['data']]}, {arguments.commit}"
     (arguments.folder / "benchmark.svg").write_text(Plot(shown, title).svg(), encoding="utf-8")
-    (arguments.folder / "benchmark_growth.svg").write_text(
-        GrowthPlot(growth, f"Time of a query as things grow, {arguments.commit}").svg(),
-        encoding="utf-8")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kind", choices=("peers", "hard", "camera"))
     parser.add_argument("results", type=Path, nargs="+",
-                        help="peers: two CSV and tables; hard: three CSV; camera: tables. Tables are in "
+                        help="peers: one CSV; hard: three CSV; camera: tables. Tables are in "
                              "Markdown, each after a line '# NAME'")
     for name in ("commit", "machine", "date"):
         parser.add_argument("--" + name, required=True)

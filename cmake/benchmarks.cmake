@@ -85,11 +85,6 @@ target_sources(benchmark_peers PRIVATE
   benchmark/peers/signed_grid.cpp
   benchmark/peers/synthetic.cpp)
 target_sources(benchmark_self_pasted PRIVATE benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
-target_sources(benchmark_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
-target_sources(benchmark_modes PRIVATE
-  benchmark/peers/kinect.cpp
-  benchmark/peers/scene.cpp
-  benchmark/peers/synthetic.cpp)
 # ist_proximity_peer(NAME HEADER [LIBRARY...]): compiles benchmark/peers/NAME.cpp where they are.
 function(ist_proximity_peer name header)
   find_path(IST_PROXIMITY_${name}_INCLUDE_DIR ${header})
