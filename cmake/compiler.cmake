@@ -21,7 +21,7 @@ if(IST_PROXIMITY_WERROR)
 endif()
 
 # The compiler collects no garbage before it has taken this many kilobytes, which few sources do.
-if(IST_PROXIMITY_PRECOMPILE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_compile_options(--param=ggc-min-heapsize=1000000)
 endif()
 

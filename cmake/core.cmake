@@ -16,7 +16,8 @@ if(IST_PROXIMITY_FUZZ)
     COMPILE_DEFINITIONS "EIGEN_NO_DEBUG;EIGEN_STRONG_INLINE=inline __attribute__((always_inline))")
 endif()
 
-add_library(ist_proximity_core ${core_sources})
+ist_proximity_units(core_units ${core_sources})
+add_library(ist_proximity_core ${core_units})
 add_library(ist_proximity::ist_proximity_core ALIAS ist_proximity_core)
 target_compile_features(ist_proximity_core PUBLIC cxx_std_17)
 target_include_directories(ist_proximity_core
@@ -35,11 +36,6 @@ target_link_libraries(ist_proximity_core
     ist_proximity::urdfdom
     ist_proximity::urdfdom_headers
     ist_proximity::xxhash)
-# A third of the compiler's work. Not the default: it hides an include that is missing.
-if(IST_PROXIMITY_PRECOMPILE)
-  target_precompile_headers(ist_proximity_core PRIVATE
-    <Eigen/Core> <Eigen/Geometry> <algorithm> <functional> <memory> <string> <vector>)
-endif()
 
 # Each file in src/tools is a program of its own; the folder of its name holds the rest of it.
 find_path(IST_PROXIMITY_CLI11_INCLUDE_DIR CLI/CLI.hpp)

@@ -1,7 +1,9 @@
 # The ROS library, node and nodelet, and the files to which a robot's launch file refers.
 
-file(GLOB ros_sources CONFIGURE_DEPENDS src/ros/*.cpp src/ros/*/*.cpp)
-add_library(ist_proximity_ros ${ros_sources})
+file(GLOB ros_sources CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}
+  src/ros/*.cpp src/ros/*/*.cpp)
+ist_proximity_units(ros_units ${ros_sources})
+add_library(ist_proximity_ros ${ros_units})
 target_include_directories(ist_proximity_ros PRIVATE src)
 add_dependencies(ist_proximity_ros ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
 target_link_libraries(ist_proximity_ros PUBLIC ist_proximity_core ${catkin_LIBRARIES})
@@ -9,17 +11,14 @@ target_link_libraries(ist_proximity_ros PUBLIC ist_proximity_core ${catkin_LIBRA
 add_executable(proximity_node src/nodes/proximity_node.cpp)
 target_link_libraries(proximity_node PRIVATE ist_proximity_ros)
 
-add_library(ist_proximity_nodelet MODULE src/nodes/proximity_nodelet.cpp)
+add_executable(velocity_filter_node src/nodes/velocity_filter_node.cpp)
+target_link_libraries(velocity_filter_node PRIVATE ist_proximity_ros)
+
+add_library(ist_proximity_nodelet MODULE
+  src/nodes/proximity_nodelet.cpp src/nodes/velocity_filter_nodelet.cpp)
 target_link_libraries(ist_proximity_nodelet PRIVATE ist_proximity_ros)
 
-if(IST_PROXIMITY_PRECOMPILE)
-  target_precompile_headers(ist_proximity_ros PRIVATE
-    <ros/ros.h> <sensor_msgs/PointCloud2.h> <ist_proximity/ProximityArray.h>
-    <Eigen/Core> <Eigen/Geometry> <algorithm> <chrono> <functional> <map> <memory> <mutex>
-    <optional> <sstream> <string> <thread> <vector>)
-endif()
-
-foreach(target ist_proximity_ros proximity_node ist_proximity_nodelet)
+foreach(target ist_proximity_ros proximity_node velocity_filter_node ist_proximity_nodelet)
   target_include_directories(${target} PRIVATE src)
   # Warnings in system headers are not ours to mend.
   target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
@@ -44,13 +43,15 @@ foreach(target simulator_node dodge_node slow_down direct_controller)
 endforeach()
 
 set_target_properties(ist_proximity_ros ist_proximity_nodelet PROPERTIES INSTALL_RPATH "$ORIGIN")
-set_target_properties(proximity_node PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
+set_target_properties(proximity_node velocity_filter_node PROPERTIES
+  INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
 
 install(TARGETS ist_proximity_ros ist_proximity_nodelet
   ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
   RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
-install(TARGETS proximity_node RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(TARGETS proximity_node velocity_filter_node
+  RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(DIRECTORY include/ist_proximity/ros/
   DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION}/ros FILES_MATCHING PATTERN "*.h")
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})

@@ -25,7 +25,3 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # False alarms: of a std::variant on the stack GCC 12 thinks that every alternative is destroyed.
   target_compile_options(test_helpers PRIVATE -Wno-free-nonheap-object -Wno-maybe-uninitialized)
 endif()
-if(IST_PROXIMITY_PRECOMPILE)
-  target_precompile_headers(test_helpers PRIVATE
-    <Eigen/Core> <Eigen/Geometry> <algorithm> <functional> <memory> <string> <vector>)
-endif()

@@ -70,17 +70,13 @@ function(ist_proximity_gtest test)
   set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT 600)
 endfunction()
 
-# Read once for all tests: half of the compiler's work. The helpers' headers only where the build is
-# not an engineer's, who changes them.
+# Read once for all tests: half of the compiler's work.
 set(test_headers
   <gtest/gtest.h> <Eigen/Core> <Eigen/Geometry>
-  <algorithm> <functional> <map> <memory> <random> <string> <thread> <variant> <vector>)
-if(IST_PROXIMITY_PRECOMPILE)
-  list(APPEND test_headers <support/meshes.h> <support/random_links.h>
-    <support/scene.h> <support/shape_oracle.h>
-    <ist_proximity/cloud/ingest.h> <ist_proximity/proximity/proximity_query.h>
-    <ist_proximity/robot/robot_model.h>)
-endif()
+  <algorithm> <functional> <map> <memory> <random> <string> <thread> <variant> <vector>
+  <support/meshes.h> <support/random_links.h> <support/scene.h> <support/shape_oracle.h>
+  <ist_proximity/cloud/ingest.h> <ist_proximity/proximity/proximity_query.h>
+  <ist_proximity/robot/robot_model.h>)
 
 set(first_test "")
 foreach(source IN LISTS core_test_sources)
@@ -99,7 +95,7 @@ foreach(source IN LISTS core_test_sources)
   endif()
   add_executable(${test} ${source})
   target_link_libraries(${test} PRIVATE test_support GTest::Main)
-  if(IST_PROXIMITY_PRECOMPILE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT IST_PROXIMITY_SANITIZE)
     # A quarter of the compiler's work. The core and the helpers, where tests spend their time, are
     # optimized fully.
     target_compile_options(${test} PRIVATE -O1)
@@ -157,7 +153,7 @@ if(rostest_FOUND)
   file(GLOB rostests CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} test/ros/*.test)
   foreach(file IN LISTS rostests)
     add_rostest(${file} DEPENDENCIES
-      proximity_node ist_proximity_nodelet simulator_node dodge_node)
+      proximity_node velocity_filter_node ist_proximity_nodelet simulator_node dodge_node)
     string(REPLACE "/" "_" test ${file})
     # Tests that measure rates and ages run one at a time. The others wait for what the node says, or
     # know how late the machine is (faults).

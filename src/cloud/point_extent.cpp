@@ -6,14 +6,13 @@
 #include <sstream>
 #include <utility>
 
+#include "internal/geometry/numbers.h"
 #include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 namespace {
 
 using Footprint = ExtentConfig::Footprint;
-
-constexpr double kPi = 3.14159265358979323846;
 
 // A patch between four pixels: no point of it is farther from the nearest of them than half its
 // diagonal, which is longest where the surface is inclined along it.

@@ -10,6 +10,7 @@
 #include "contact/outward_field.h"
 #include "contact/power_cells.h"
 #include "internal/bvh/traversal_stack.h"
+#include "internal/tree/sphere_lanes.h"
 
 namespace ist {
 namespace {
@@ -123,14 +124,12 @@ double greatest_overlap(const std::vector<InnerSphere>& spheres) {
 double greatest_density(const ContactSpheres& spheres, const Eigen::Vector3d& center,
                         double radius) {
   constexpr float kRounding = 1.0F + 1e-4F;
-  using Lanes = Eigen::Array<float, kSphereWidth, 1>;
-  using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
   const Eigen::Vector3f c = center.cast<float>();
   const float r = kRounding * static_cast<float>(radius);
   const auto intersects = [&](const auto& node) {
-    const Lanes x = LaneMap(node.x) - c.x(), y = LaneMap(node.y) - c.y(),
-                z = LaneMap(node.z) - c.z();
-    return ((x * x + y * y + z * z).sqrt() < LaneMap(node.radius) + r).eval();
+    const SphereLanes x = SphereLaneMap(node.x) - c.x(), y = SphereLaneMap(node.y) - c.y(),
+                      z = SphereLaneMap(node.z) - c.z();
+    return ((x * x + y * y + z * z).sqrt() < SphereLaneMap(node.radius) + r).eval();
   };
   float greatest = 0.0F;
   TraversalStack<Candidate, stack_capacity(kMaxTreeLevels, kSphereWidth)> stack;
@@ -141,7 +140,8 @@ double greatest_density(const ContactSpheres& spheres, const Eigen::Vector3d& ce
     if (candidate.child < 0) {
       const ContactLeaf& leaf = spheres.leaves[static_cast<std::size_t>(~candidate.child)];
       greatest = std::max(
-          greatest, intersects(leaf).select(LaneMap(leaf.cell_ratio), Lanes::Zero()).maxCoeff());
+          greatest,
+          intersects(leaf).select(SphereLaneMap(leaf.cell_ratio), SphereLanes::Zero()).maxCoeff());
       continue;
     }
     const auto number = static_cast<std::size_t>(candidate.child);

@@ -5,21 +5,19 @@
 #include <limits>
 
 #include "internal/bvh/traversal_stack.h"
+#include "internal/tree/sphere_lanes.h"
 
 namespace ist {
 namespace {
-
-// Eight numbers side by side; Eigen turns them into SIMD, square roots included.
-using Lanes = Eigen::Array<float, kSphereWidth, 1>;
-using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
 
 struct Entry {
   std::int32_t child;
   float bound;  // [m] no sphere below is entered deeper
 };
 
-Lanes distances(const Eigen::Vector3f& p, const float* x, const float* y, const float* z) {
-  const Lanes dx = p.x() - LaneMap(x), dy = p.y() - LaneMap(y), dz = p.z() - LaneMap(z);
+SphereLanes distances(const Eigen::Vector3f& p, const float* x, const float* y, const float* z) {
+  const SphereLanes dx = p.x() - SphereLaneMap(x), dy = p.y() - SphereLaneMap(y),
+                    dz = p.z() - SphereLaneMap(z);
   return (dx * dx + dy * dy + dz * dz).sqrt();
 }
 
@@ -38,14 +36,15 @@ double depth_in_spheres(const InnerSphereTree& tree, const Eigen::Vector3d& p_L,
     if (!(entry.bound > deepest)) continue;
     if (entry.child < 0) {
       const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~entry.child)];
-      const Lanes depth = LaneMap(leaf.inner_radius) - distances(p, leaf.x, leaf.y, leaf.z);
+      const SphereLanes depth =
+          SphereLaneMap(leaf.inner_radius) - distances(p, leaf.x, leaf.y, leaf.z);
       deepest = std::max(deepest, depth.maxCoeff());
       if (deepest > stop) break;
       continue;
     }
     const SphereNode& node = tree.nodes()[static_cast<std::size_t>(entry.child)];
-    const Lanes bound =
-        (LaneMap(node.radius) - distances(p, node.x, node.y, node.z)).min(LaneMap(node.max_inner));
+    const SphereLanes bound = (SphereLaneMap(node.radius) - distances(p, node.x, node.y, node.z))
+                                  .min(SphereLaneMap(node.max_inner));
     const std::size_t first = stack.size();
     for (int k = 0; k < node.count; ++k) {
       if (bound[k] > deepest) {

@@ -11,11 +11,11 @@
 #include "internal/cloud/box_bvh.h"
 #include "internal/cloud/point_bvh.h"
 #include "internal/cloud/thinned_cloud.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A link's volume is at most this many cells, where leaves of a map fill it.
 constexpr double kCellsPerLink = 1000.0;
 // A leaf of a map is halved no more often: 2^42 cells along each axis.

@@ -29,12 +29,12 @@ TriangleMesh surface(const Shape& shape) {
   return std::get<TriangleMesh>(shape);
 }
 
-struct Sum {
+struct CellSum {
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
   double area = 0.0;
 };
 // By cell, and the side that the triangle faces, so that a thin plate keeps both.
-using Cells = std::map<std::tuple<std::int64_t, std::int64_t, std::int64_t, int>, Sum>;
+using Cells = std::map<std::tuple<std::int64_t, std::int64_t, std::int64_t, int>, CellSum>;
 using Corners = std::array<Eigen::Vector3d, 3>;
 
 // Adds a triangle to the cells: halves the longest edge until it is no longer than a cell.
@@ -52,8 +52,9 @@ void gather(const Corners& corners, int side, double area, double spacing, int h
   if (length <= spacing || halvings == 0) {
     const Eigen::Vector3d p = (corners[0] + corners[1] + corners[2]) / 3.0;
     const Eigen::Vector3d cell = (p / spacing).array().floor();
-    Sum& sum = (*cells)[{static_cast<std::int64_t>(cell.x()), static_cast<std::int64_t>(cell.y()),
-                         static_cast<std::int64_t>(cell.z()), side}];
+    CellSum& sum =
+        (*cells)[{static_cast<std::int64_t>(cell.x()), static_cast<std::int64_t>(cell.y()),
+                  static_cast<std::int64_t>(cell.z()), side}];
     sum.moment += area * p;
     sum.area += area;
     return;

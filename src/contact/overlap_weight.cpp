@@ -14,28 +14,29 @@ namespace ist {
 namespace {
 
 // Sixteen numbers side by side; Eigen turns them into SIMD, square roots included.
-using Lanes = Eigen::Array<float, kPointWidth, 1>;
-using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
+using PointLanes = Eigen::Array<float, kPointWidth, 1>;
+using PointLaneMap = Eigen::Map<const PointLanes, Eigen::Aligned16>;
 
 // Leaves between two looks at the clock, where their points have been thinned before.
 constexpr std::uint32_t kLeavesBetweenLooks = 16;
 
-Lanes squared_distance(const BoxNode& node, const Eigen::Vector3f& p) {
+PointLanes squared_distance(const BoxNode& node, const Eigen::Vector3f& p) {
   const auto gap = [](const float* min, const float* max, float v) {
-    return Lanes((LaneMap(min) - v).max(v - LaneMap(max)).max(0.0F));
+    return PointLanes((PointLaneMap(min) - v).max(v - PointLaneMap(max)).max(0.0F));
   };
-  const Lanes x = gap(node.min_x, node.max_x, p.x());
-  const Lanes y = gap(node.min_y, node.max_y, p.y());
-  const Lanes z = gap(node.min_z, node.max_z, p.z());
+  const PointLanes x = gap(node.min_x, node.max_x, p.x());
+  const PointLanes y = gap(node.min_y, node.max_y, p.y());
+  const PointLanes z = gap(node.min_z, node.max_z, p.z());
   return x * x + y * y + z * z;
 }
 
 // The volumes of the lenses between sixteen spheres of radius R and one of radius r, summed; over
 // pi / 12. Unused slots are far away and add nothing.
 float lens_sum(const PointTile& tile, const Eigen::Vector3f& p, float R, float r) {
-  const Lanes x = p.x() - LaneMap(tile.x), y = p.y() - LaneMap(tile.y), z = p.z() - LaneMap(tile.z);
-  const Lens<Lanes> lens(Lanes::Constant(R + r), Lanes::Constant(R - r),
-                         (x * x + y * y + z * z).sqrt());
+  const PointLanes x = p.x() - PointLaneMap(tile.x), y = p.y() - PointLaneMap(tile.y),
+                   z = p.z() - PointLaneMap(tile.z);
+  const Lens<PointLanes> lens(PointLanes::Constant(R + r), PointLanes::Constant(R - r),
+                              (x * x + y * y + z * z).sqrt());
   return (lens.thickness.square() * lens.factor).sum();
 }
 
@@ -56,7 +57,7 @@ void add_lenses(const ThinnedCloud& cloud, const Eigen::Vector3f& p, float R, fl
       for (const ThinnedTile& tile : cloud.tiles(child, &buffer)) *sum += lens_sum(tile, p, R, r);
       continue;
     }
-    const Lanes squared = squared_distance(node, p);
+    const PointLanes squared = squared_distance(node, p);
     for (int k = 0; k < node.count; ++k) {
       if (squared[k] < touch_sq) stack.push(node.child[k]);
     }

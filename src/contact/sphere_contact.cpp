@@ -5,72 +5,72 @@
 
 #include "contact/lens.h"
 #include "internal/bvh/traversal_stack.h"
+#include "internal/tree/sphere_lanes.h"
 
 namespace ist {
 namespace {
 
-// Eight numbers side by side; Eigen turns them into SIMD, square roots included.
-using Lanes = Eigen::Array<float, kSphereWidth, 1>;
-using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
-
 // An outward field shorter than this has no direction any more: it shortens to 0 and does not turn.
-constexpr float kUndecided = 0.2F;
+constexpr float kUndecidedLength = 0.2F;
 
 struct Vectors {
-  Lanes x, y, z;
+  SphereLanes x, y, z;
 };
 
-Lanes length(const Vectors& v) { return (v.x * v.x + v.y * v.y + v.z * v.z).sqrt(); }
+SphereLanes length(const Vectors& v) { return (v.x * v.x + v.y * v.y + v.z * v.z).sqrt(); }
 
 Vectors shortened(const Vectors& v) {
-  const Lanes scale =
-      (v.x * v.x + v.y * v.y + v.z * v.z + kUndecided * kUndecided).sqrt().inverse();
+  const SphereLanes scale =
+      (v.x * v.x + v.y * v.y + v.z * v.z + kUndecidedLength * kUndecidedLength).sqrt().inverse();
   return {v.x * scale, v.y * scale, v.z * scale};
 }
 
 // The lenses between eight spheres of a link and one sphere of the obstacle.
 struct Lenses {
   Lenses(const ContactLeaf& leaf, const Eigen::Vector3f& center, float radius)
-      : offset{center.x() - LaneMap(leaf.x), center.y() - LaneMap(leaf.y),
-               center.z() - LaneMap(leaf.z)} {
-    const LaneMap own(leaf.radius);
-    const Lanes distance = length(offset), difference = own - radius;
-    const Lens<Lanes> lens(own + radius, difference, distance);
-    volume = LaneMap(leaf.cell_ratio) * static_cast<float>(M_PI / 12.0) * lens.thickness.square() *
-             lens.factor;
+      : offset{center.x() - SphereLaneMap(leaf.x), center.y() - SphereLaneMap(leaf.y),
+               center.z() - SphereLaneMap(leaf.z)} {
+    const SphereLaneMap own(leaf.radius);
+    const SphereLanes distance = length(offset), difference = own - radius;
+    const Lens<SphereLanes> lens(own + radius, difference, distance);
+    volume = SphereLaneMap(leaf.cell_ratio) * static_cast<float>(M_PI / 12.0) *
+             lens.thickness.square() * lens.factor;
     middle = lens_middle(difference, distance);
   }
-  Vectors offset;  // [m] from the link's spheres' centres to the obstacle's
-  Lanes volume;    // [m^3] of the lens, times the cell ratio
-  Lanes middle;    // where the lens's middle lies along `offset`, 0 to 1
+  Vectors offset;      // [m] from the link's spheres' centres to the obstacle's
+  SphereLanes volume;  // [m^3] of the lens, times the cell ratio
+  SphereLanes middle;  // where the lens's middle lies along `offset`, 0 to 1
 };
 
 // The link's outward field at the lenses' middles.
 Vectors outward_field(const ContactLeaf& leaf, const Lenses& lenses) {
-  const Lanes x = lenses.middle * lenses.offset.x, y = lenses.middle * lenses.offset.y,
-              z = lenses.middle * lenses.offset.z;
+  const SphereLanes x = lenses.middle * lenses.offset.x, y = lenses.middle * lenses.offset.y,
+                    z = lenses.middle * lenses.offset.z;
   const auto component = [&](int row) {
-    return Lanes(LaneMap(leaf.outward[row]) + LaneMap(leaf.gradient[3 * row]) * x +
-                 LaneMap(leaf.gradient[3 * row + 1]) * y + LaneMap(leaf.gradient[3 * row + 2]) * z);
+    return SphereLanes(SphereLaneMap(leaf.outward[row]) +
+                       SphereLaneMap(leaf.gradient[3 * row]) * x +
+                       SphereLaneMap(leaf.gradient[3 * row + 1]) * y +
+                       SphereLaneMap(leaf.gradient[3 * row + 2]) * z);
   };
   return shortened({component(0), component(1), component(2)});
 }
 
 // The other link's outward field there; the offset from its centre has the opposite direction.
 Vectors outward_field(const FieldSphere& sphere, const Lenses& lenses) {
-  const Lanes back = lenses.middle - 1.0F;
-  const Lanes x = back * lenses.offset.x, y = back * lenses.offset.y, z = back * lenses.offset.z;
+  const SphereLanes back = lenses.middle - 1.0F;
+  const SphereLanes x = back * lenses.offset.x, y = back * lenses.offset.y,
+                    z = back * lenses.offset.z;
   const auto component = [&](int row) {
-    return Lanes(sphere.outward[row] + sphere.gradient(row, 0) * x + sphere.gradient(row, 1) * y +
-                 sphere.gradient(row, 2) * z);
+    return SphereLanes(sphere.outward[row] + sphere.gradient(row, 0) * x +
+                       sphere.gradient(row, 1) * y + sphere.gradient(row, 2) * z);
   };
   return shortened({component(0), component(1), component(2)});
 }
 
 // Sums over lenses, lane by lane.
-struct Sum {
-  Lanes volume = Lanes::Zero();
-  Vectors normal = {Lanes::Zero(), Lanes::Zero(), Lanes::Zero()};
+struct ContactSum {
+  SphereLanes volume = SphereLanes::Zero();
+  Vectors normal = {SphereLanes::Zero(), SphereLanes::Zero(), SphereLanes::Zero()};
   Vectors moment = normal;
 
   void add(const ContactLeaf& leaf, const Lenses& lenses, const Vectors& n) {
@@ -79,9 +79,9 @@ struct Sum {
     normal.x += f.x;
     normal.y += f.y;
     normal.z += f.z;
-    const Lanes x = LaneMap(leaf.x) + lenses.middle * lenses.offset.x;
-    const Lanes y = LaneMap(leaf.y) + lenses.middle * lenses.offset.y;
-    const Lanes z = LaneMap(leaf.z) + lenses.middle * lenses.offset.z;
+    const SphereLanes x = SphereLaneMap(leaf.x) + lenses.middle * lenses.offset.x;
+    const SphereLanes y = SphereLaneMap(leaf.y) + lenses.middle * lenses.offset.y;
+    const SphereLanes z = SphereLaneMap(leaf.z) + lenses.middle * lenses.offset.z;
     moment.x += y * f.z - z * f.y;
     moment.y += z * f.x - x * f.z;
     moment.z += x * f.y - y * f.x;
@@ -112,9 +112,10 @@ void visit_lenses(const ContactSpheres& link, const Eigen::Vector3f& center, flo
       continue;
     }
     const SphereNode& node = link.tree.nodes()[static_cast<std::size_t>(child)];
-    const Lanes distance = length({center.x() - LaneMap(node.x), center.y() - LaneMap(node.y),
-                                   center.z() - LaneMap(node.z)}) -
-                           LaneMap(node.radius);
+    const SphereLanes distance =
+        length({center.x() - SphereLaneMap(node.x), center.y() - SphereLaneMap(node.y),
+                center.z() - SphereLaneMap(node.z)}) -
+        SphereLaneMap(node.radius);
     for (int k = 0; k < node.count; ++k) {
       if (distance[k] < radius) stack.push(node.child[k]);
     }
@@ -127,7 +128,7 @@ ContactVolume sphere_contact(const ContactSpheres& link, const Eigen::Vector3d& 
                              double radius) {
   const Eigen::Vector3f c = center.cast<float>();
   const auto r = static_cast<float>(radius);
-  Sum sum;
+  ContactSum sum;
   visit_lenses(link, c, r, [&](const ContactLeaf& leaf, const Lenses& lenses) {
     const Vectors own = outward_field(leaf, lenses);
     sum.add(leaf, lenses, {-own.x, -own.y, -own.z});
@@ -136,7 +137,7 @@ ContactVolume sphere_contact(const ContactSpheres& link, const Eigen::Vector3d& 
 }
 
 ContactVolume sphere_contact(const ContactSpheres& link, const FieldSphere& sphere) {
-  Sum sum;
+  ContactSum sum;
   visit_lenses(
       link, sphere.center, sphere.radius, [&](const ContactLeaf& leaf, const Lenses& lenses) {
         const Vectors own = outward_field(leaf, lenses);

@@ -29,7 +29,7 @@ struct Element {
   std::vector<Property> properties;
 };
 
-struct Header {
+struct PlyHeader {
   std::string encoding;
   std::vector<Element> elements;
 };
@@ -51,7 +51,7 @@ bool parse_format(const std::string& name, NumberFormat* format) {
   return true;
 }
 
-std::string read_property(const std::vector<std::string>& words, Header* header) {
+std::string read_property(const std::vector<std::string>& words, PlyHeader* header) {
   Property property;
   property.is_list = words.size() == 5 && words[1] == "list";
   const std::size_t last = words.size() - 1;
@@ -64,7 +64,7 @@ std::string read_property(const std::vector<std::string>& words, Header* header)
   return "";
 }
 
-std::string read_header(TextScanner* in, Header* header) {
+std::string read_ply_header(TextScanner* in, PlyHeader* header) {
   const std::vector<std::string> magic = in->at_end() ? std::vector<std::string>() : in->words();
   if (magic.size() != 1 || magic[0] != "ply") return "is no PLY file: its first line is not 'ply'";
   while (!in->at_end()) {
@@ -221,8 +221,8 @@ std::string check_elements(const std::vector<Element>& elements) {
 
 std::string parse_ply(const std::string& bytes, PointFile* file) {
   TextScanner in(bytes);
-  Header header;
-  std::string problem = read_header(&in, &header);
+  PlyHeader header;
+  std::string problem = read_ply_header(&in, &header);
   if (!problem.empty()) return problem;
   if (header.encoding != "ascii" && header.encoding != "binary_little_endian" &&
       header.encoding != "binary_big_endian") {

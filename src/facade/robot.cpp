@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "internal/geometry/limits.h"
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/regular_file.h"
 #include "internal/robot/mesh_size.h"
 #include "internal/robot/package_resolver.h"
@@ -115,7 +116,6 @@ struct Robot::Impl {
 
   /// @param q  one configuration; with or without positions of the mimic joints
   const LinkPoses& place(Span<const double> q, QueryWorker* worker) const {
-    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t j = 0; j < free_joints.size(); ++j) {
       worker->q[free_joints[j]] = std::isfinite(q[j]) ? q[j] : kNaN;
     }

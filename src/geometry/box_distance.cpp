@@ -8,7 +8,7 @@ namespace ist {
 namespace {
 
 // Triangles with less height than this share of their length count as their edges alone.
-constexpr double kNoArea = 1e-8;
+constexpr double kNoHeight = 1e-8;
 
 BoxDistance from_point(const Eigen::Vector3d& p, const Eigen::AlignedBox3d& box) {
   BoxDistance result;
@@ -71,7 +71,7 @@ BoxDistance triangle_to_box(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   }
   if (best.distance == 0.0) return best;
   const Eigen::Vector3d n = (b - a).cross(c - a);
-  if (!(n.norm() > kNoArea * longest_sq)) return best;
+  if (!(n.norm() > kNoHeight * longest_sq)) return best;
   // The box's corners farthest against and along the normal.
   const Eigen::Vector3d low = (n.array() > 0.0).select(box.min(), box.max());
   const Eigen::Vector3d high = (n.array() > 0.0).select(box.max(), box.min());

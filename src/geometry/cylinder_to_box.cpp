@@ -16,7 +16,7 @@ struct Vertex {
   Eigen::Vector3d w, on_cylinder, on_box;
 };
 
-struct Simplex {
+struct BoxSimplex {
   std::array<Vertex, 4> vertex;
   std::array<double, 4> weight{};
   std::size_t size = 0;
@@ -73,7 +73,7 @@ std::array<double, kColumns> least_squares(std::array<Eigen::Vector3d, kColumns>
 // Finds the weights of the vertices at the point of their affine hull that is nearest to the
 // origin; false if that point lies outside their convex hull.
 template <std::size_t kOthers>
-bool solve(const Simplex& face, std::array<double, 4>* weight) {
+bool solve(const BoxSimplex& face, std::array<double, 4>* weight) {
   std::array<Eigen::Vector3d, kOthers> edges;
   for (std::size_t j = 0; j < kOthers; ++j) edges[j] = face.vertex[j + 1].w - face.vertex[0].w;
   const std::array<double, kOthers> solution = least_squares<kOthers>(edges, -face.vertex[0].w);
@@ -87,7 +87,7 @@ bool solve(const Simplex& face, std::array<double, 4>* weight) {
   return first >= 0.0;
 }
 
-bool solve(Simplex* face) {
+bool solve(BoxSimplex* face) {
   switch (face->size) {
     case 1:
       face->weight[0] = 1.0;
@@ -104,12 +104,12 @@ bool solve(Simplex* face) {
 // The face of the simplex that holds its point nearest to the origin. The point is nearer than any
 // of the others without the last vertex, so the face has that one. All eight such faces are tried:
 // that is robust where vertices nearly coincide, unlike a selection by Voronoi regions.
-Simplex nearest_face(const Simplex& simplex) {
-  Simplex best;
+BoxSimplex nearest_face(const BoxSimplex& simplex) {
+  BoxSimplex best;
   double best_sq = std::numeric_limits<double>::infinity();
   const unsigned last = 1U << (simplex.size - 1);
   for (unsigned set = last; set < 2U * last; ++set) {
-    Simplex face;
+    BoxSimplex face;
     for (std::size_t i = 0; i < simplex.size; ++i) {
       if ((set >> i & 1U) != 0) face.vertex[face.size++] = simplex.vertex[i];
     }
@@ -139,7 +139,7 @@ BoxDistance cylinder_to_box(const Cylinder& cylinder, const Eigen::Isometry3d& X
   constexpr int kMaxSteps = 100;
   constexpr double kTouch = 1e-12;     // [m]
   constexpr double kResolved = 1e-13;  // of the squared distance
-  Simplex simplex;
+  BoxSimplex simplex;
   simplex.size = 1;
   simplex.weight[0] = 1.0;
   const Eigen::Vector3d center = X_OE.translation();
@@ -153,9 +153,9 @@ BoxDistance cylinder_to_box(const Cylinder& cylinder, const Eigen::Isometry3d& X
     lower_bound = std::max(lower_bound, v.dot(w) / v.norm());
     if (lower_bound > max_distance) break;
     if (v.squaredNorm() - v.dot(w) <= kResolved * v.squaredNorm()) break;
-    Simplex larger = simplex;
+    BoxSimplex larger = simplex;
     larger.vertex[larger.size++] = {w, on_cylinder, on_box};
-    const Simplex face = nearest_face(larger);
+    const BoxSimplex face = nearest_face(larger);
     const Eigen::Vector3d nearer = face.nearest();
     if (!(nearer.squaredNorm() < v.squaredNorm())) break;  // by rounding alone
     simplex = face;

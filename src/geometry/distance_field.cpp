@@ -27,7 +27,7 @@ constexpr double kCoarseCells = 3.0;  // their edges, as multiples of fine ones
 // The same of the grid of depths.
 constexpr double kDepthCell = 0.005, kMaxDepthNodes = 5e4;
 // [m] More than double loses in the distance of a link's places.
-constexpr double kRounding = 1e-9;
+constexpr double kFieldRounding = 1e-9;
 
 Eigen::Array3i nodes_of(const Eigen::AlignedBox3d& box, double cell) {
   return (box.sizes().array() / cell).ceil().max(1.0).cast<int>() + 1;
@@ -180,7 +180,7 @@ class DistanceField::Builder {
   }
 
   static double steps(double distance, double step, double most) {
-    return std::clamp(std::floor((distance - kRounding) / step), 0.0, most);
+    return std::clamp(std::floor((distance - kFieldRounding) / step), 0.0, most);
   }
 
   // The first node of a row knows nothing of its neighbour.
@@ -198,7 +198,8 @@ class DistanceField::Builder {
     const double to_last =
         has_surface_ ? from_last.norm() : std::numeric_limits<double>::infinity();
     if (has_surface_ && to_last > 0.0) hint_L_ = from_last / to_last;
-    const double limit = std::min(upper_ + cell_, to_last) * (1.0 + kRounding) + kRounding;
+    const double limit =
+        std::min(upper_ + cell_, to_last) * (1.0 + kFieldRounding) + kFieldRounding;
     const double tolerance =
         cell_ / static_cast<double>(kSlackParts) * std::min(cell_ / std::max(upper_, cell_), 1.0);
     const SignedDistance found =

@@ -17,8 +17,8 @@ constexpr std::size_t kMinPoints = 128, kMaxLooks = 40000000;
 constexpr double kErrors[] = {0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 1e-9};
 // Float's error in a sum of three products: the point that is chosen may be this share of its
 // coordinates less far than the farthest.
-constexpr double kFloatRounding = 1e-6;
-constexpr int kMaxSteps = 40;
+constexpr double kCoresetRounding = 1e-6;
+constexpr int kMaxCoresetSteps = 40;
 
 // Points about the rim of a cylinder's cap, and from pole to pole of a sphere.
 constexpr int kRimPoints = 128, kMeridianPoints = 48;
@@ -116,7 +116,7 @@ class HullCoreset::Builder {
     double error = 0.0;
     for (const double distance : distances_) error = std::max(error, distance);
     // A point of the hull is at most the largest of its corners' distances from the coreset's hull.
-    set_.error_ = error + (kFloatRounding + kLostInLength) * extent_;
+    set_.error_ = error + (kCoresetRounding + kLostInLength) * extent_;
   }
 
  private:
@@ -187,7 +187,7 @@ Eigen::Vector3d HullCoreset::offset(const Eigen::Vector3d& p, std::uint32_t* poi
   };
   add_corner(*point_index);
   Eigen::Vector3d v = simplex.nearest();
-  for (int step = 0; step < kMaxSteps && simplex.size < 4 && v.norm() > 0.0; ++step) {
+  for (int step = 0; step < kMaxCoresetSteps && simplex.size < 4 && v.norm() > 0.0; ++step) {
     const std::uint32_t next = farthest(v);
     if (v.dot(p - points_[next]) >= (1.0 - 1e-6) * v.squaredNorm()) break;
     const DifferenceSimplex smaller = simplex;

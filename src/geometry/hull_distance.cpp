@@ -5,25 +5,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
-using Corner = DifferenceSimplex::Corner;
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr int kMaxSteps = 40;
+constexpr int kMaxDistanceSteps = 40;
 
 // Weights of the point of a simplex' face that is nearest to the origin.
 struct Face {
   std::array<double, 4> weight{};
-  double distance_sq = kInf;  // [m^2]
+  double distance_sq = kInfinity;  // [m^2]
 };
 
-void keep_nearer(const std::array<Corner, 4>& c, const std::array<double, 4>& weight, Face* best) {
+void keep_nearer(const std::array<DifferenceSimplex::Corner, 4>& c,
+                 const std::array<double, 4>& weight, Face* best) {
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < 4; ++i) {
     if (weight[i] > 0.0) v += weight[i] * c[i].w;
@@ -32,7 +30,8 @@ void keep_nearer(const std::array<Corner, 4>& c, const std::array<double, 4>& we
   if (distance_sq < best->distance_sq) *best = {weight, distance_sq};
 }
 
-void try_edge(const std::array<Corner, 4>& c, std::size_t i, std::size_t j, Face* best) {
+void try_edge(const std::array<DifferenceSimplex::Corner, 4>& c, std::size_t i, std::size_t j,
+              Face* best) {
   const Eigen::Vector3d along = c[j].w - c[i].w;
   const double length_sq = along.squaredNorm();
   const double t = length_sq > 0.0 ? std::clamp(-c[i].w.dot(along) / length_sq, 0.0, 1.0) : 0.0;
@@ -43,8 +42,8 @@ void try_edge(const std::array<Corner, 4>& c, std::size_t i, std::size_t j, Face
 }
 
 // The interior of a triangle, or its edges where the origin is not over it.
-void try_triangle(const std::array<Corner, 4>& c, std::size_t i, std::size_t j, std::size_t k,
-                  Face* best) {
+void try_triangle(const std::array<DifferenceSimplex::Corner, 4>& c, std::size_t i, std::size_t j,
+                  std::size_t k, Face* best) {
   const Eigen::Vector3d n = (c[j].w - c[i].w).cross(c[k].w - c[i].w);
   const double of_i = n.dot(c[j].w.cross(c[k].w)), of_j = n.dot(c[k].w.cross(c[i].w)),
                of_k = n.dot(c[i].w.cross(c[j].w));
@@ -62,7 +61,7 @@ void try_triangle(const std::array<Corner, 4>& c, std::size_t i, std::size_t j, 
 }
 
 // Faces that the origin is not certain to be behind; if there is none, the tetrahedron holds it.
-void try_tetrahedron(const std::array<Corner, 4>& c, Face* best) {
+void try_tetrahedron(const std::array<DifferenceSimplex::Corner, 4>& c, Face* best) {
   constexpr std::size_t kFaces[4][4] = {{1, 2, 3, 0}, {0, 2, 3, 1}, {0, 1, 3, 2}, {0, 1, 2, 3}};
   std::array<double, 4> volume{};
   bool holds_origin = true;
@@ -136,10 +135,10 @@ class Gjk {
   HullDistance run(double precision, double enough) {
     HullDistance result;
     Eigen::Vector3d v = simplex_.nearest();
-    for (int step = 0; step < kMaxSteps && simplex_.size < 4 && v.norm() > 1e-9; ++step) {
+    for (int step = 0; step < kMaxDistanceSteps && simplex_.size < 4 && v.norm() > 1e-9; ++step) {
       const double distance = v.norm();
       const Eigen::Vector3d n = v / distance;
-      const Corner next = farthest(n);
+      const DifferenceSimplex::Corner next = farthest(n);
       const double bound = n.dot(next.w);
       if (bound > result.lower_bound || step == 0) {
         result.lower_bound = bound;
@@ -172,8 +171,8 @@ class Gjk {
   }
 
  private:
-  Corner corner(std::uint32_t a, std::uint32_t b) const {
-    Corner c;
+  DifferenceSimplex::Corner corner(std::uint32_t a, std::uint32_t b) const {
+    DifferenceSimplex::Corner c;
     c.on_a = R_BA_ * a_.point(a) + p_BA_;
     c.on_b = b_.point(b);
     c.w = c.on_a - c.on_b;
@@ -182,14 +181,14 @@ class Gjk {
     return c;
   }
 
-  Corner farthest(const Eigen::Vector3d& n) const {
+  DifferenceSimplex::Corner farthest(const Eigen::Vector3d& n) const {
     const Eigen::Vector3d n_A = -(R_BA_.transpose() * n);
     return is_exact_ ? corner(a_.farthest_in_double(n_A), b_.farthest_in_double(n))
                      : corner(a_.farthest(n_A), b_.farthest(n));
   }
 
   // @returns whether the corner leads nearer to the origin
-  bool move_on(const Corner& next) {
+  bool move_on(const DifferenceSimplex::Corner& next) {
     if (is_known(next)) return false;
     DifferenceSimplex larger = simplex_;
     larger.corner[larger.size++] = next;
@@ -201,7 +200,7 @@ class Gjk {
     return true;
   }
 
-  bool is_known(const Corner& c) const {
+  bool is_known(const DifferenceSimplex::Corner& c) const {
     for (std::size_t i = 0; i < simplex_.size; ++i) {
       if (simplex_.corner[i].a == c.a && simplex_.corner[i].b == c.b) return true;
     }

@@ -12,7 +12,7 @@ using Edge = OpenEdgeHierarchy::Edge;
 
 constexpr double kFourPi = 12.566370614359172;
 // Float loses less than this share of a length that it holds.
-constexpr double kRounding = 5e-7;
+constexpr double kEdgeRounding = 5e-7;
 constexpr int kBisections = 6;
 constexpr float kFarAway = 1e6F;  // [m]
 
@@ -60,7 +60,7 @@ OpenEdgeBlock make_block(const Edge* edges, std::size_t size) {
       block.along[axis][i] = static_cast<float>(along[axis]);
     }
     block.per_length_sq[i] = static_cast<float>(1.0 / std::max(along.squaredNorm(), 1e-30));
-    block.length[i] = static_cast<float>((1.0 + kRounding) * edge.count * along.norm());
+    block.length[i] = static_cast<float>((1.0 + kEdgeRounding) * edge.count * along.norm());
     block.count[i] = static_cast<float>(edge.count);
   }
   return block;
@@ -122,9 +122,9 @@ OpenEdgeNode make_node(const Cluster* clusters, std::size_t size) {
         node.moment[i][j][k] = static_cast<float>(cluster.moment(i, j));
       }
     }
-    node.radius[k] =
-        static_cast<float>((1.0 + kRounding) * cluster.radius + kRounding * cluster.center.norm());
-    node.length[k] = static_cast<float>((1.0 + kRounding) * cluster.length);
+    node.radius[k] = static_cast<float>((1.0 + kEdgeRounding) * cluster.radius +
+                                        kEdgeRounding * cluster.center.norm());
+    node.length[k] = static_cast<float>((1.0 + kEdgeRounding) * cluster.length);
     node.child[k] = cluster.child;
   }
   return node;
@@ -169,7 +169,7 @@ OpenEdgeHierarchy::OpenEdgeHierarchy(std::vector<Edge> edges, const CancelReques
 }
 
 double OpenEdgeHierarchy::rounding(const Eigen::Vector3d& p_M) const {
-  return kRounding * ((p_M - origin_).norm() + extent_);
+  return kEdgeRounding * ((p_M - origin_).norm() + extent_);
 }
 
 OpenEdgeSums OpenEdgeHierarchy::sums(const Eigen::Vector3d& p_M) const {

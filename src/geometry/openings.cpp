@@ -10,11 +10,11 @@
 #include "geometry/solid_element.h"
 #include "internal/geometry/boundary_edges.h"
 #include "internal/geometry/hole_caps.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // The error of a winding number, and some of rounding (TriangleBvh::winding_number).
 constexpr double kWindingError = 0.011;
 // Cells of an element, at most; and the radius [m] at which they are small enough.
@@ -151,7 +151,7 @@ struct Openings::Variation {
     first += std::min(sum_of<2>(hole.single_edges, center_L, radius),
                       sum_of<3>(hole.single_caps, center_L, radius));
     second += 2.0 * sum_of<3>(hole.single_edges, center_L, radius);
-    for (std::size_t i = 0; i < hole.count.size() && second < kInf; ++i) {
+    for (std::size_t i = 0; i < hole.count.size() && second < kInfinity; ++i) {
       const Piece& edge = hole.single_edges[i];
       const Eigen::Vector3d a = edge.middle - edge.along - center_L;
       const Eigen::Vector3d b = edge.middle + edge.along - center_L;
@@ -165,7 +165,6 @@ struct Openings::Variation {
     return std::min(first * radius, (slope + 0.5 * second * radius) * radius);
   }
 
-  static constexpr double kInf = std::numeric_limits<double>::infinity();
   double first = 0.0, of_far = 0.0, second = 0.0;
   Eigen::Vector3d field = Eigen::Vector3d::Zero();
 };

@@ -93,9 +93,9 @@ RayPacket packet_of(const Eigen::Vector3d& o, const TriangleBvh::Directions& dir
   packet.margin = static_cast<float>(kRounding * (radius + o.norm()));
   // An edge function sums products of coordinates and directions: float rounds off less than forty
   // times 2^-24 of the largest.
-  constexpr double kEdgeRounding = 4e-6;
+  constexpr double kBesideEdge = 4e-6;
   const double size = radius + reference.norm() + std::sqrt(apart_sq);
-  packet.edge_margin = static_cast<float>(kEdgeRounding * size * size * std::sqrt(longest_sq));
+  packet.edge_margin = static_cast<float>(kBesideEdge * size * size * std::sqrt(longest_sq));
   return packet;
 }
 

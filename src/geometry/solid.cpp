@@ -1,12 +1,12 @@
 #include "ist_proximity/geometry/solid.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "geometry/primitive_distance.h"
 #include "geometry/solid_element.h"
 #include "internal/geometry/limits.h"
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/solid_queries.h"
 #include "ist_proximity/geometry/error.h"
 
@@ -28,7 +28,6 @@ Solid make_solid(const LinkGeometry& geometry, const std::function<bool()>& canc
 }
 
 SignedDistance Solid::signed_distance(const Eigen::Vector3d& p_L) const {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   SignedDistance best;
   for (const SolidElement& element : elements_of(*this)) {
     const Eigen::Vector3d p_E = element.X_EL * p_L;

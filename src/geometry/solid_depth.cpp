@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "geometry/primitive_distance.h"
 #include "geometry/solid_element.h"
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/solid_queries.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // A surface that is known to be within a distance must not be missed through rounding.
 double rounded_up(double distance) { return (1.0 + 1e-9) * distance + kTouchDistance; }

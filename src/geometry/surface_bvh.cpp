@@ -9,6 +9,7 @@
 
 #include "geometry/solid_element.h"
 #include "internal/geometry/float_rounding.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
@@ -135,10 +136,9 @@ struct Fit {
 // The smallest box with these axes that float can state.
 Fit fit(const std::vector<ConvexPart>& parts, std::uint32_t first, std::uint32_t last,
         const Eigen::Matrix3d& axes) {
-  constexpr double kInf = std::numeric_limits<double>::infinity();
   Fit result;
   result.axes = axes.cast<float>().cast<double>();
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(kInf), high = -low;
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(kInfinity), high = -low;
   for (std::uint32_t i = first; i < last; ++i) {
     const ConvexPart& part = parts[i];
     for (int axis = 0; axis < 3; ++axis) {
@@ -318,13 +318,12 @@ struct BoundedChild {
 
 // Branch and bound: float decides which parts are measured in double.
 double SurfaceBvh::support(const Eigen::Vector3d& n_L) const {
-  constexpr double kInf = std::numeric_limits<double>::infinity();
-  if (parts_.empty()) return -kInf;
+  if (parts_.empty()) return -kInfinity;
   const double rounding = 2e-6 * extent_;
   const Eigen::Vector3f n = n_L.cast<float>();
   TraversalStack<BoundedChild, stack_capacity(kMaxLevels, kWidth)> stack;
-  stack.push({kInf, nodes_[0].child[0], kRoot});
-  double largest = hull_.empty() ? -kInf : n_L.dot(hull_.point(hull_.farthest(n_L)));
+  stack.push({kInfinity, nodes_[0].child[0], kRoot});
+  double largest = hull_.empty() ? -kInfinity : n_L.dot(hull_.point(hull_.farthest(n_L)));
   while (!stack.empty()) {
     const BoundedChild entry = stack.pop();
     if (entry.bound <= largest) continue;

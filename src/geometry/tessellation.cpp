@@ -7,10 +7,11 @@
 #include <map>
 #include <utility>
 
+#include "internal/geometry/numbers.h"
+
 namespace ist {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kMinSides = 8, kMaxSides = 512;
 constexpr int kMaxSubdivisions = 5;
 // The largest ratio of height to width of lateral quads.

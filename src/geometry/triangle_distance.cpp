@@ -10,9 +10,9 @@
 namespace ist {
 namespace {
 
-using Corners = std::array<const Eigen::Vector3d*, 3>;
+using CornerPointers = std::array<const Eigen::Vector3d*, 3>;
 
-Corners corners_of(const ConvexPart& part) { return {&part.a, &part.b, &part.c}; }
+CornerPointers corners_of(const ConvexPart& part) { return {&part.a, &part.b, &part.c}; }
 
 // The lower bound is as good as the distance when it is less by no more than this share.
 constexpr double kResolved = 1e-12;
@@ -76,7 +76,7 @@ class TrianglePair {
   // [m] The width of the slab between the triangles that is perpendicular to n, where P is on the
   // side to which n points; negative where there is none. @param n  unit
   double slab(const Eigen::Vector3d& n) const {
-    const auto along = [&](const Corners& corners, std::size_t i) {
+    const auto along = [&](const CornerPointers& corners, std::size_t i) {
       return n.dot(*corners[i] - best_.on_q);
     };
     const double above =
@@ -90,7 +90,7 @@ class TrianglePair {
   // the triangles and the common perpendiculars of their edges (the axes of the separating axis
   // test) do not depend on these.
   void prove_by_axes() {
-    const auto edge = [](const Corners& corners, std::size_t i) {
+    const auto edge = [](const CornerPointers& corners, std::size_t i) {
       return Eigen::Vector3d(*corners[(i + 1) % 3] - *corners[i]);
     };
     prove_by_axis(edge(corners_p_, 0), edge(corners_p_, 1));
@@ -120,7 +120,7 @@ class TrianglePair {
   // Whether the edge from s to t passes through a triangle: its ends are on different sides of the
   // plane, and the line passes all edges on the same side. Where rounding spoils a sign, one of the
   // distances that are measured already is as small as rounding.
-  bool pierce(const Eigen::Vector3d& s, const Eigen::Vector3d& t, const Corners& triangle) {
+  bool pierce(const Eigen::Vector3d& s, const Eigen::Vector3d& t, const CornerPointers& triangle) {
     const Eigen::Vector3d a = *triangle[0] - s, b = *triangle[1] - s, c = *triangle[2] - s;
     const Eigen::Vector3d st = t - s, n = (b - a).cross(c - a);
     const double from_s = -n.dot(a), from_t = n.dot(st - a);
@@ -136,7 +136,7 @@ class TrianglePair {
   }
 
   const ConvexPart &p_, &q_;
-  const Corners corners_p_, corners_q_;
+  const CornerPointers corners_p_, corners_q_;
   double best_sq_ = std::numeric_limits<double>::infinity();
   ConvexDistance best_;
 };

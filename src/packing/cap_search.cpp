@@ -15,15 +15,15 @@ namespace {
 constexpr double kMinCap = 0.5;
 constexpr double kMinCapTolerances = 8.0;
 // An opening is looked for where the distance to the mesh is at least this share of a cap's size.
-constexpr double kMinDistance = 0.25;
+constexpr double kLeastCapDistance = 0.25;
 constexpr std::size_t kMaxCaps = 50000;
 // Climb from a cap's centroid to a point farther from the mesh.
-constexpr int kMaxSteps = 12;
-constexpr double kMinStep = 0.05;  // share of the distance to the mesh
-constexpr double kMaxLag = 0.2;    // share of a step by which the distance may fall short of it
+constexpr int kMaxClimbs = 12;
+constexpr double kLeastClimb = 0.05;  // share of the distance to the mesh
+constexpr double kMaxLag = 0.2;       // share of a step by which the distance may fall short of it
 // Openings are searched across a cap at these shares of its distance to the mesh.
 constexpr double kOffsets[] = {0.02, 0.15, 0.4};
-constexpr int kBisections = 5;
+constexpr int kCapBisections = 5;
 
 }  // namespace
 
@@ -57,7 +57,7 @@ void HoleObstacles::search_cap(const Cap& cap) {
   ++cap_count_;
   if (distance + size <= tolerance_ || is_covered(cap, closest.point)) return;
   const Eigen::Vector3d normal = (cap.b - cap.a).cross(cap.c - cap.a).stableNormalized();
-  if (distance > std::max(0.5 * tolerance_, kMinDistance * size)) {
+  if (distance > std::max(0.5 * tolerance_, kLeastCapDistance * size)) {
     const OpeningPoint opening = opening_across(y, normal, distance);
     if (opening) {
       const Eigen::Vector3d middle = climb_in_plane(y, normal, closest);
@@ -107,7 +107,7 @@ Eigen::Vector3d HoleObstacles::climb_in_plane(const Eigen::Vector3d& y,
                                               const ClosestPoint& closest) const {
   Eigen::Vector3d x = y, q = closest.point;
   double distance = std::sqrt(closest.distance_sq), step = 0.5 * distance;
-  for (int i = 0; i < kMaxSteps && step > kMinStep * distance; ++i) {
+  for (int i = 0; i < kMaxClimbs && step > kLeastClimb * distance; ++i) {
     const Eigen::Vector3d away = x - q, in_plane = away - normal.dot(away) * normal;
     if (in_plane.norm() <= 0.0) break;
     const Eigen::Vector3d next = x + step * in_plane.normalized();
@@ -144,7 +144,7 @@ HoleObstacles::OpeningPoint HoleObstacles::opening_across(const Eigen::Vector3d&
       high_is_outside = !high_is_outside;
     }
   }
-  for (int i = 0; i < kBisections; ++i) {
+  for (int i = 0; i < kCapBisections; ++i) {
     const double middle = 0.5 * (low + high);
     (is_outside(y + middle * normal) == low_is_outside ? low : high) = middle;
   }

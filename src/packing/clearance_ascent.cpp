@@ -7,11 +7,11 @@
 namespace ist {
 namespace {
 
-constexpr int kMaxSteps = 40;
+constexpr int kMaxAscents = 40;
 constexpr std::size_t kContacts = 8;
-constexpr double kMinStep = 0.01;   // share of the clearance
-constexpr double kMinRise = 1e-3;   // share of the clearance; a smaller rise is none
-constexpr double kMinSlope = 0.05;  // below it the point counts as a local maximum
+constexpr double kLeastAscent = 0.01;  // share of the clearance
+constexpr double kMinRise = 1e-3;      // share of the clearance; a smaller rise is none
+constexpr double kMinSlope = 0.05;     // below it the point counts as a local maximum
 
 // The nearest points of the obstacles met last; the oldest is overwritten first.
 class Contacts {
@@ -62,7 +62,7 @@ MedialSphere climb_clearance(const MedialSphereFinder& finder, const Eigen::Vect
   Contacts contacts;
   contacts.add(obstacle.contact);
   double step = 0.5 * sphere.radius;
-  for (int i = 0; i < kMaxSteps && step > kMinStep * sphere.radius; ++i) {
+  for (int i = 0; i < kMaxAscents && step > kLeastAscent * sphere.radius; ++i) {
     const Eigen::Vector3d direction = contacts.steepest_ascent(sphere.center, sphere.radius + step);
     const double slope = direction.norm();
     if (slope < kMinSlope) {

@@ -12,8 +12,8 @@ namespace ist {
 namespace {
 
 constexpr int kVolumeSamples = 100000;
-constexpr int kDirections = 100;
-constexpr int kMarchSteps = 12;
+constexpr int kReportDirections = 100;
+constexpr int kReportSteps = 12;
 constexpr double kTouch = 1e-9;  // [m]
 constexpr double kGoldenAngle = 2.39996322972865332;
 
@@ -26,7 +26,7 @@ Eigen::Vector3d cube_point(int i) {
 
 // Evenly spread on the unit sphere (a Fibonacci lattice).
 Eigen::Vector3d direction(int i) {
-  const double z = 1.0 - (2.0 * i + 1.0) / kDirections;
+  const double z = 1.0 - (2.0 * i + 1.0) / kReportDirections;
   const double radius = std::sqrt(1.0 - z * z);
   return {radius * std::cos(kGoldenAngle * i), radius * std::sin(kGoldenAngle * i), z};
 }
@@ -35,7 +35,7 @@ Eigen::Vector3d direction(int i) {
 // centre, found by sphere tracing.
 double protrusion_along(const Solid& solid, const InnerSphere& sphere, const Eigen::Vector3d& ray) {
   double t = sphere.radius;
-  for (int i = 0; i < kMarchSteps; ++i) {
+  for (int i = 0; i < kReportSteps; ++i) {
     const Eigen::Vector3d p = sphere.center + t * ray;
     const double distance =
         std::abs(distance_outside(solid, p, std::numeric_limits<double>::infinity()).distance);
@@ -52,7 +52,7 @@ double protrusion(const Solid& solid, const InnerSphere& sphere) {
   const double depth = -solid.signed_distance(sphere.center).distance;
   double largest = std::max(0.0, sphere.radius - depth);
   if (solid.is_closed()) return largest;
-  for (int i = 0; i < kDirections; ++i) {
+  for (int i = 0; i < kReportDirections; ++i) {
     largest = std::max(largest, protrusion_along(solid, sphere, direction(i)));
   }
   return largest;

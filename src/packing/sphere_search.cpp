@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "internal/bvh/traversal_stack.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 constexpr double kGrowth = 0.5;
 constexpr std::size_t kMaxLevels = 64;
 // Rounding must not prune a sphere that is as good as the best one.
-constexpr double kRounding = 1.0 + 1e-12;
+constexpr double kAsGood = 1.0 + 1e-12;
 // Spheres of a leaf after a rebuild; insertions fill it up.
 constexpr std::ptrdiff_t kBuiltLeaf = 4;
 
@@ -48,7 +49,7 @@ class SphereSearch::PatchCorners {
   bool is_costlier(const WeightedCenter& sphere, double cost) const {
     const double max_distance = cost + sphere.weight;
     return max_distance < 0.0 || (sphere.center - mean_).squaredNorm() + variance_ >
-                                     kRounding * max_distance * max_distance;
+                                     kAsGood * max_distance * max_distance;
   }
 
  private:
@@ -102,7 +103,6 @@ std::uint32_t SphereSearch::build(std::uint32_t* first, std::uint32_t* last) {
 // Makes a leaf if they are few enough, else an inner node without its children.
 SphereSearch::Node SphereSearch::make_node(const std::uint32_t* first,
                                            const std::uint32_t* last) const {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Node node{{}, kInfinity, -kInfinity, 0, 0, {}};
   for (const std::uint32_t* sphere = first; sphere != last; ++sphere) {
     extend(&node, *sphere);

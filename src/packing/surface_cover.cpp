@@ -17,7 +17,7 @@ constexpr double kGapShares[] = {0.6, 0.33, 0.15};
 constexpr double kMaxGapShare = 0.9;
 constexpr int kProgressInterval = 256;
 // Searches for a sphere that no hole refuses.
-constexpr int kMaxTries = 8;
+constexpr int kMaxPlacements = 8;
 
 // A patch gets a sphere if its sampled gap is at least this share of its upper bound; else it is
 // split.
@@ -57,7 +57,7 @@ bool SurfaceCover::fill(double min_radius, VolumeFiller* filler) {
 // Searches again while holes refuse what is found; the last resort is the surface point s itself.
 template <class Search>
 MedialSphere SurfaceCover::admitted(const Eigen::Vector3d& s, const Search& search) const {
-  for (int i = 0; i < kMaxTries && watch_.keeps_on(); ++i) {
+  for (int i = 0; i < kMaxPlacements && watch_.keeps_on(); ++i) {
     MedialSphere sphere = search();
     if (finder_.is_closed() || sphere.radius <= 0.0 || finder_.admits(sphere)) return sphere;
   }

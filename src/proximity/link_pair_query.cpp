@@ -4,13 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/solid_queries.h"
 #include "proximity/link_pair_search.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // Pairs of boxes that the front may hold.
 constexpr std::size_t kFrontCapacity = 1024;
@@ -54,10 +53,10 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
                             const QueryConfig& config) {
   const Eigen::Isometry3d X_BA = relative_pose(X_FB.X, X_FA.X);
   const double moved =
-      has_pose_ ? relative_displacement(surface_a_, surface_b_, X_BA_, X_BA) : kInf;
+      has_pose_ ? relative_displacement(surface_a_, surface_b_, X_BA_, X_BA) : kInfinity;
   const double since_reference =
       has_pose_ ? relative_displacement(surface_a_, surface_b_, surfaces_.reference_pose(), X_BA)
-                : kInf;
+                : kInfinity;
   kept_bound_ = are_closed_ && has_pose_ ? lower_bound() - moved : depth_limit();
   openings_a_.note_motion(moved);
   openings_b_.note_motion(moved);
@@ -75,7 +74,7 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   surfaces_.move_to(X_BA, since_reference);
   is_finished_ = are_in_contact_ = false;
   depth_bound_ = depth_limit();
-  depth_distance_ = kInf;
+  depth_distance_ = kInfinity;
 }
 
 bool LinkPairQuery::advance(int* steps) {
@@ -229,7 +228,7 @@ void LinkPairQuery::bound_by_slabs() {
   constexpr double kFirstTurn = 0.5, kLastTurn = 1e-10;  // [rad] 0.1 nm for a link of 1 m
   const ConvexDistance& closest = surfaces_.closest();
   const double wanted = are_in_contact_ ? depth_distance_ : 0.0;
-  if (!(closest.distance < kInf) || wanted < -kGrazing) return;
+  if (!(closest.distance < kInfinity) || wanted < -kGrazing) return;
   Eigen::Vector3d up_B = X_BA_ * a_.tree.center() - b_.tree.center();
   double width = slab_width(up_B.normalized());
   const auto take = [&](const Eigen::Vector3d& direction_B) {
@@ -258,7 +257,7 @@ void LinkPairQuery::bound_by_slabs() {
 // [m] Of the slab across a direction from B to A, at least; +inf where it is no unit vector.
 double LinkPairQuery::slab_width(const Eigen::Vector3d& up_B) const {
   constexpr double kRounding = 1e-14;  // of the lengths that are added
-  if (!(std::abs(up_B.squaredNorm() - 1.0) < 1e-9)) return kInf;
+  if (!(std::abs(up_B.squaredNorm() - 1.0) < 1e-9)) return kInfinity;
   const Eigen::Vector3d down_A = -(X_BA_.linear().transpose() * up_B);
   const double top_of_b = support(b_.solid, up_B);
   const double bottom_of_a = up_B.dot(X_BA_.translation()) - support(a_.solid, down_A);
@@ -279,12 +278,12 @@ void LinkPairQuery::report(PairProximity* result) const {
   if (lower >= range_) {
     result->decided = is_decided();
     result->state = LinkState::kClear;
-    result->distance = kInf;
+    result->distance = kInfinity;
     result->lower_bound = config_.max_distance;
     return;
   }
   const ConvexDistance& closest = surfaces_.closest();
-  if (!are_in_contact_ && !(closest.distance > 0.0 && closest.distance < kInf)) return;
+  if (!are_in_contact_ && !(closest.distance > 0.0 && closest.distance < kInfinity)) return;
   result->decided = is_decided();
   result->lower_bound = lower - pose_uncertainty(lower) - config_.margin;
   result->state = are_in_contact_ && depth_distance_ < 0.0 ? LinkState::kContact : LinkState::kNear;

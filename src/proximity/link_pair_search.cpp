@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/solid_queries.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr int kMaxProjections = 20;
 
 }  // namespace
@@ -64,13 +64,13 @@ double LinkPairSearch::prune_bound() const {
 double LinkPairSearch::cover_bound(const Eigen::Vector3d& p_B, double radius) const {
   const double gap = b_.tree.interior_gap();
   const double outer = b_.tree.cover_distance(p_B, gap + (has_holes_ ? radius : 0.0));
-  return outer > gap + (has_holes_ ? radius : 0.0) ? outer - radius : -kInf;
+  return outer > gap + (has_holes_ ? radius : 0.0) ? outer - radius : -kInfinity;
 }
 
 void LinkPairSearch::push(const Eigen::Vector3d& p_A, double radius, std::int32_t child) {
   const Eigen::Vector3d p_B = X_BA_ * p_A;
   double bound = cover_bound(p_B, radius);
-  if (bound == -kInf) {
+  if (bound == -kInfinity) {
     bound = distance_floor(b_.solid, p_B, b_.solid.signed_distance(p_B)) - radius;
   }
   if (bound >= prune_bound()) return prune(bound);

@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Error of a lower bound in float, relative to the numbers involved: posing a centre takes seven
 // roundings of 2^-24, a distance five more; this is above their sum.

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <type_traits>
 
 #include "internal/bvh/traversal_stack.h"
+#include "internal/geometry/numbers.h"
 #include "proximity/extent_measure.h"
 #include "proximity/link_query.h"
 #include "proximity/search.h"
@@ -13,7 +13,6 @@
 namespace ist {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Fronts of spheres and of points of one index are different fronts.
 constexpr std::uint64_t kExtentFront = std::uint64_t{1} << 63U;
 

@@ -1,10 +1,10 @@
 // The search of one index, for its obstacles or for the spheres that they stand for.
 
 #include <algorithm>
-#include <limits>
 #include <type_traits>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/geometry/numbers.h"
 #include "proximity/link_query.h"
 #include "proximity/obstacle_measure.h"
 #include "proximity/search.h"
@@ -12,7 +12,6 @@
 namespace ist {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // [m] A link that has moved farther has another nearest obstacle: the search finds it sooner than
 // the last answer's obstacle is measured.
 constexpr double kFarMoved = 0.03;

@@ -2,14 +2,11 @@
 
 #include "proximity/link_query.h"
 
-#include <limits>
-
+#include "internal/geometry/numbers.h"
 #include "proximity/obstacle_measure.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The child whose box is nearest to a place.
 int nearest_child(const BoxNode& node, const Eigen::Vector3d& p_O) {

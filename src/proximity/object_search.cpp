@@ -5,10 +5,11 @@
 #include <string>
 #include <utility>
 
+#include "internal/geometry/numbers.h"
+
 namespace ist {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
 // [m] Link and objects may move by this much until the list of objects is made anew.
 constexpr double kListSlack = 0.1;
 // Of all coordinates involved: the rounding of a box's distance.
@@ -72,7 +73,7 @@ double ObjectSearch::less_errors(double bound, const PosedObject& object) const 
   bound -= kBoxRounding * scale;
   const double drift = X_FL_.drift + object.X_FO.drift;
   const double proven = bound - pose_error(drift, extent_ + object.extent, bound);
-  return proven > 0.0 ? proven : -kInf;
+  return proven > 0.0 ? proven : -kInfinity;
 }
 
 // [m] A lower bound of the distance of the boxes; -inf where they may overlap.
@@ -105,7 +106,7 @@ void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, const PosedObjects& obje
   ++queries_;
   is_known_ = true;
   is_finished_ = false;
-  proven_ = distance_ = kInf;
+  proven_ = distance_ = kInfinity;
   list_objects();
   collect_candidates();
   if (candidates_.empty()) {
@@ -166,7 +167,7 @@ void ObjectSearch::collect_candidates() {
 double ObjectSearch::stop_bound() const {
   const QueryConfig& config = question_.config;
   double nearest = config.max_distance;
-  if (distance_ < kInf) {
+  if (distance_ < kInfinity) {
     const double tolerance =
         std::max(config.tolerance, config.relative_tolerance * std::abs(distance_));
     nearest = std::min(nearest, distance_ - tolerance);
@@ -265,7 +266,7 @@ LinkProximity ObjectSearch::answer_of(const PairProximity& found, const PosedObj
 }
 
 double ObjectSearch::lower_bound() const {
-  if (!is_known_) return -kInf;
+  if (!is_known_) return -kInfinity;
   double bound = std::min(proven_, question_.config.max_distance);
   if (!candidates_.empty()) bound = std::min(bound, candidates_.front().bound);
   if (current_ != nullptr) {
@@ -284,11 +285,11 @@ void ObjectSearch::report(LinkProximity* result) {
   const double bound = lower_bound();
   if (bound >= question_.config.max_distance) {
     result->state = LinkState::kClear;
-    result->distance = kInf;
+    result->distance = kInfinity;
     result->lower_bound = question_.config.max_distance;
     return;
   }
-  if (!(distance_ < kInf) || bound == -kInf) return;
+  if (!(distance_ < kInfinity) || bound == -kInfinity) return;
   *result = nearest_;
   result->lower_bound = std::min(bound, distance_ - question_.config.margin);
 }

@@ -2,15 +2,14 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "internal/geometry/closest_point_on_triangle.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr std::size_t kFrontCapacity = 512;
+constexpr std::size_t kOpeningCapacity = 512;
 // [m] Openings that are farther are not looked at again before the links have moved by that much.
 constexpr double kFarEnough = 0.02;
 // Spheres that may be tested near openings, and pairs of boxes looked at, at one pose.
@@ -98,10 +97,10 @@ class CellVisitor : public SurfacePairSearch::Visitor {
 OpeningSearch::OpeningSearch(const LinkSurface& a, const LinkSurface& b, OpeningSearch* memory)
     : a_(a),
       is_closed_(a.opening_cells.empty()),
-      search_(a.opening_cells, b.surface, is_closed_ ? 2 * SurfaceBvh::kWidth : kFrontCapacity,
+      search_(a.opening_cells, b.surface, is_closed_ ? 2 * SurfaceBvh::kWidth : kOpeningCapacity,
               memory != nullptr ? &memory->search_ : nullptr),
-      moved_(kInf) {
-  if (is_closed_) clearance_ = kInf;
+      moved_(kInfinity) {
+  if (is_closed_) clearance_ = kInfinity;
 }
 
 void OpeningSearch::note_motion(double displacement) {

@@ -3,13 +3,12 @@
 #include <algorithm>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/outside_margin.h"
 #include "proximity/obstacle_measure.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Eigen::Vector3d place_of(const SearchEntry& point) {
   return Eigen::Vector3d(point.min[0], point.min[1], point.min[2]);

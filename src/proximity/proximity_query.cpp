@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <limits>
 
+#include "internal/geometry/numbers.h"
 #include "proximity/coherence/scene_tracker.h"
 #include "proximity/link_query.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // [m] A finished lower bound may be this much lower than the tolerance asks for: 0.2 um by rounding
 // for each metre of coordinates, of which there are no more than ten in a robot's work.
 constexpr double kBoundError = 2e-6;
@@ -20,7 +20,6 @@ constexpr double kFirstObstacles = 5e-5;
 }  // namespace
 
 void LinkProximity::reset() {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   state = LinkState::kUnknown;
   distance = kNaN;
   lower_bound = -std::numeric_limits<double>::infinity();

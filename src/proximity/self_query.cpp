@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "internal/geometry/cancelled.h"
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/relative_pose.h"
 #include "internal/proximity/deadline.h"
 #include "proximity/link_pair_query.h"
@@ -20,7 +21,6 @@ bool can_query(const LinkModel& link) { return link.usable() && !link.tree.empty
 }  // namespace
 
 void PairProximity::reset() {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   state = LinkState::kUnknown;
   distance = kNaN;
   lower_bound = -std::numeric_limits<double>::infinity();

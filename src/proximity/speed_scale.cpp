@@ -5,11 +5,11 @@
 #include <sstream>
 #include <utility>
 
+#include "internal/geometry/numbers.h"
+
 namespace ist {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // [m/s] A walking person (ISO 13855), assumed at least while obstacles' speed is not known.
 constexpr double kWalkingSpeed = 1.6;
 

@@ -1,15 +1,13 @@
 // Pairs of boxes and their children: in float, in the frame of one surface.
 
 #include <algorithm>
-#include <limits>
 #include <optional>
 
+#include "internal/geometry/numbers.h"
 #include "proximity/surface_pair_search.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // A box of one surface in the frame of the other one.
 OrientedBox posed_box(const SurfaceBvh& bvh, SurfaceBvh::Slot slot, const Eigen::Matrix3f& R,
@@ -44,7 +42,7 @@ double child_bound(const ConvexPart& part, const SurfaceBvh::Node& node, std::si
 
 void SurfacePairSearch::set_direction() {
   Eigen::Vector3d n = closest_.on_p - closest_.on_q;
-  if (!(closest_.distance > 1e-9 && closest_.distance < kInf)) {
+  if (!(closest_.distance > 1e-9 && closest_.distance < kInfinity)) {
     const auto middle = [](const SurfaceBvh& bvh) {
       return bvh.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero())
                          : Eigen::Vector3d(bvh.bounds().center());
@@ -76,7 +74,7 @@ SurfacePairSearch::Expansion SurfacePairSearch::expand(const Pair& pair, std::ui
   Expansion result;
   result.count = 0;
   result.unwanted = 0;
-  result.least_unwanted = kInf;
+  result.least_unwanted = kInfinity;
   for (int k = 0; k < node.count; ++k) {
     const auto bit = static_cast<std::uint8_t>(1U << static_cast<unsigned>(k));
     if (children != 0 && (children & bit) == 0) continue;

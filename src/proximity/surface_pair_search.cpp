@@ -8,17 +8,16 @@
 
 #include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/float_rounding.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
-
 // Float's error in the bounds of boxes, as a share of all coordinates and sizes involved.
-constexpr double kBoxRounding = 2e-6;
+constexpr double kPairRounding = 2e-6;
 // [m] The front is dropped after a longer jump, where it fits no more, and after a longer path, so
 // that keys keep their digits.
-constexpr double kJump = 0.02, kLongestPath = 10.0;
+constexpr double kJump = 0.02, kLongestPairPath = 10.0;
 // A search of so many pairs meets ties, such as parallel faces.
 constexpr int kManyPairs = 4096;
 // Hulls are asked for their distance to this part of the tolerance.
@@ -51,7 +50,7 @@ SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, s
 void SurfacePairSearch::start_anew() {
   front_.clear();
   aside_.clear();
-  least_aside_ = kInf;
+  least_aside_ = kInfinity;
   is_complete_ = true;
   path_ = moved_ = plane_key_ = 0.0;
   if (!is_empty()) push({kUnproven, SurfaceBvh::kRoot, SurfaceBvh::kRoot, 0});
@@ -64,10 +63,10 @@ void SurfacePairSearch::move_to(const Eigen::Isometry3d& X_BA, double displaceme
   p_BA_ = X_BA_.translation().cast<float>();
   R_AB_ = X_AB_.linear().cast<float>();
   p_AB_ = X_AB_.translation().cast<float>();
-  moved_ = displacement >= 0.0 ? displacement : kInf;
+  moved_ = displacement >= 0.0 ? displacement : kInfinity;
   is_at_reference_ = false;
   const double scale = X_BA.translation().norm() + a_.extent() + b_.extent();
-  rounding_ = kBoxRounding * scale;
+  rounding_ = kPairRounding * scale;
   exact_rounding_ = 2.0 * kLostInLength * scale;
   closest_ = {};
   if (!is_empty()) measure(witness_a_, witness_b_);
@@ -156,7 +155,7 @@ void SurfacePairSearch::begin_search() {
   // A front that costs more than to start anew has become too fine for what is near now.
   if (is_new_) cost_of_new_ = looked_at_;
   const bool is_worn = !is_new_ && looked_at_ > cost_of_new_;
-  const bool fits = moved_ <= kJump && path() <= kLongestPath && is_complete_ &&
+  const bool fits = moved_ <= kJump && path() <= kLongestPairPath && is_complete_ &&
                     front_.size() + aside_.size() <= capacity_;
   is_new_ = is_worn || !fits;
   path_ += moved_;
@@ -164,7 +163,7 @@ void SurfacePairSearch::begin_search() {
   if (is_new_) start_anew();
   for (const Entry& entry : aside_) push(entry);
   aside_.clear();
-  least_aside_ = kInf;
+  least_aside_ = kInfinity;
   reference_X_BA_ = X_BA_;
   is_at_reference_ = true;
   looked_at_ = 0;
@@ -256,7 +255,7 @@ bool SurfacePairSearch::visit_near(double margin, Visitor* visitor, int* steps) 
     const Pair pair = stack.pop();
     if (--*steps < 0) return false;
     if (!is_leaf(pair)) {
-      const Expansion children = expand(pair, 0, std::nextafter(margin, kInf));
+      const Expansion children = expand(pair, 0, std::nextafter(margin, kInfinity));
       for (int k = 0; k < children.count; ++k) stack.push(children.wanted[k]);
       continue;
     }

@@ -7,16 +7,16 @@ namespace ist {
 namespace {
 
 // Points along each axis of the grid; a share is known to about 3 % then.
-constexpr int kSteps = 13;
+constexpr int kSampled = 13;
 
 }  // namespace
 
 Surroundings::Surroundings(const LinkModel& link, double skin, double distance) {
   if (!link.usable() || link.tree.empty()) return;
   const double half = link.tree.radius() + distance;
-  const double step = 2.0 * half / kSteps;
-  for (int i = 0; i < kSteps * kSteps * kSteps; ++i) {
-    const Eigen::Array3i cell(i % kSteps, i / kSteps % kSteps, i / kSteps / kSteps);
+  const double step = 2.0 * half / kSampled;
+  for (int i = 0; i < kSampled * kSampled * kSampled; ++i) {
+    const Eigen::Array3i cell(i % kSampled, i / kSampled % kSampled, i / kSampled / kSampled);
     const Eigen::Vector3d p_L =
         link.tree.center().array() - half + step * (cell.cast<double>() + 0.5);
     const double apart = link.tree.cover_distance(p_L);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "internal/geometry/numbers.h"
 #include "internal/proximity/carried_worlds.h"
 #include "proximity/conservative_advancement.h"
 #include "proximity/robot_surfaces.h"
@@ -30,7 +31,6 @@ struct TimeOfImpact::Impl {
 
   /// A proven lower bound of the distance [m]; NaN where nothing is known.
   double measure(std::size_t link, const Obstacles& obstacles, double tolerance) {
-    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     const LinkPoses& links = moved.forward().links();
     if (!links.known[link]) return kNaN;
     config.tolerance = tolerance;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "internal/geometry/limits.h"
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/regular_file.h"
 
 namespace ist {
@@ -17,7 +18,6 @@ namespace {
 
 constexpr int kConeSides = 128;
 constexpr double kHalfSpaceSize = 100.0, kHalfSpaceDepth = 10.0;  // [m]
-constexpr double kPi = 3.14159265358979323846;
 
 // A fault in the text, at a line.
 struct SceneError {

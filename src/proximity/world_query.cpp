@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "internal/geometry/cancelled.h"
+#include "internal/geometry/numbers.h"
 #include "internal/proximity/deadline.h"
 #include "proximity/object_search.h"
 
@@ -13,8 +14,7 @@ namespace ist {
 namespace {
 
 // Pairs of boxes that a link looks at before the clock is read: some tens of microseconds.
-constexpr int kSlice = 256;
-constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr int kObjectSlice = 256;
 // [m] The path is counted anew after this length, so that it keeps its digits.
 constexpr double kLongestPath = 1e4;
 
@@ -151,7 +151,7 @@ void WorldQuery::Impl::move_objects(Span<const PosedWorld* const> given) {
       next->place(worlds[w].X_FB[object.frame] * object.X_BO);
       const double moved = object.shape->surface.displacement.between(before.X, next->X_FO.X) +
                            (before.drift + next->X_FO.drift) * next->extent;
-      if (!(moved <= farthest)) farthest = std::isnan(moved) ? kInf : moved;
+      if (!(moved <= farthest)) farthest = std::isnan(moved) ? kInfinity : moved;
       ++statistics.objects_placed;
     }
   }
@@ -187,7 +187,7 @@ void WorldQuery::Impl::finish_by(Deadline* deadline) {
     std::pop_heap(queue.begin(), queue.end());
     const std::size_t link = queue.back().link;
     queue.pop_back();
-    if (searches[link].advance(kSlice)) continue;
+    if (searches[link].advance(kObjectSlice)) continue;
     queue.push_back({searches[link].lower_bound(), link});
     std::push_heap(queue.begin(), queue.end());
   }

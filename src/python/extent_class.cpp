@@ -9,7 +9,7 @@ namespace py = pybind11;
 
 using Footprint = ExtentConfig::Footprint;
 
-constexpr const char* kDoc =
+constexpr const char* kExtentDoc =
     R"(How large the points of a sensor are, see doc/sources.md. Each point stands for a sphere, and
 lower_bound holds for the spheres. distance and the closest points stay those of the points.
 
@@ -47,11 +47,12 @@ ExtentConfig of_sensor(const py::object& name) {
   return config;
 }
 
-ExtentConfig make(const py::object& sensor, const py::object& noise_constant,
-                  const py::object& noise_quadratic, double sigmas, const py::object& calibration,
-                  const py::object& calibration_angle, const py::object& footprint_radius,
-                  const py::object& footprint_angle, const py::object& field_of_view,
-                  double incidence, double latency, double speed) {
+ExtentConfig make_extent(const py::object& sensor, const py::object& noise_constant,
+                         const py::object& noise_quadratic, double sigmas,
+                         const py::object& calibration, const py::object& calibration_angle,
+                         const py::object& footprint_radius, const py::object& footprint_angle,
+                         const py::object& field_of_view, double incidence, double latency,
+                         double speed) {
   ExtentConfig config = of_sensor(sensor);
   replace(noise_constant, &config.noise_constant);
   replace(noise_quadratic, &config.noise_quadratic);
@@ -102,8 +103,8 @@ ExtentConfig to_extent(const py::object& extent) {
 void define_extent(py::module_* module) {
   const ExtentConfig defaults;
   const py::none none;
-  py::class_<ExtentConfig>(*module, "Extent", kDoc)
-      .def(py::init(&make), py::arg("sensor") = none, py::kw_only(),
+  py::class_<ExtentConfig>(*module, "Extent", kExtentDoc)
+      .def(py::init(&make_extent), py::arg("sensor") = none, py::kw_only(),
            py::arg("noise_constant") = none, py::arg("noise_quadratic") = none,
            py::arg("sigmas") = defaults.sigmas, py::arg("calibration") = none,
            py::arg("calibration_angle") = none, py::arg("footprint_radius") = none,

@@ -1,7 +1,6 @@
 #include "obstacles_class.h"
 
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -9,12 +8,11 @@
 #include "arrays.h"
 #include "extent_class.h"
 #include "internal/facade/sensor_points.h"
+#include "internal/geometry/numbers.h"
 #include "ist_proximity/facade/robot.h"
 
 namespace ist::python {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 constexpr const char* kDoc =
     R"(Points of obstacles, indexed for queries. Points that are not finite are dropped. An empty

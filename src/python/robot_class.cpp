@@ -21,7 +21,7 @@
 namespace ist::python {
 namespace {
 
-constexpr const char* kDoc =
+constexpr const char* kRobotDoc =
     R"(A robot that tells its distances to obstacles.
 
 urdf: the path of a URDF file, or its text. package://NAME/ is looked for in package_dirs and
@@ -63,10 +63,11 @@ using DoneCallback = std::function<void(double)>;
 using TextCallback = std::function<void(const std::string&)>;
 
 /// Reads and packs on a thread of its own. This thread calls Python: progress, and Ctrl-C.
-Robot make(const py::object& urdf, const std::string& geometry, double max_error, int max_spheres,
-           const std::vector<std::string>& links, const py::object& cache_directory,
-           const std::vector<py::object>& package_dirs, bool allow_unknown_links,
-           const DoneCallback& progress, const TextCallback& warning) {
+Robot make_robot(const py::object& urdf, const std::string& geometry, double max_error,
+                 int max_spheres, const std::vector<std::string>& links,
+                 const py::object& cache_directory, const std::vector<py::object>& package_dirs,
+                 bool allow_unknown_links, const DoneCallback& progress,
+                 const TextCallback& warning) {
   RobotConfig config;
   if (geometry != "collision" && geometry != "visual") {
     throw py::value_error("geometry is 'collision' or 'visual', not '" + geometry + "'");
@@ -280,8 +281,8 @@ void define_query(py::class_<Robot>* type, const char* name, Arguments&&... rest
 
 void define_robot(py::module_* module) {
   const PackingConfig defaults;
-  py::class_<Robot> type(*module, "Robot", kDoc);
-  type.def(py::init(&make), py::arg("urdf"), py::kw_only(), py::arg("geometry") = "collision",
+  py::class_<Robot> type(*module, "Robot", kRobotDoc);
+  type.def(py::init(&make_robot), py::arg("urdf"), py::kw_only(), py::arg("geometry") = "collision",
            py::arg("max_error") = defaults.max_error, py::arg("max_spheres") = defaults.max_spheres,
            py::arg("links") = std::vector<std::string>(), py::arg("cache_directory") = "",
            py::arg("package_dirs") = py::list(), py::arg("allow_unknown_links") = false,

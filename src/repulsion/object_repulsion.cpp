@@ -5,8 +5,6 @@
 namespace ist {
 namespace {
 
-constexpr double kLeastSmoothing = 0.001;  // [m] as of the blend over points
-
 double weight(double distance, double nearest, const RepulsionConfig& config) {
   const double smoothing = std::max(config.smoothing, kLeastSmoothing);
   const double w = std::max(0.0, 1.0 - (distance - nearest) / smoothing);

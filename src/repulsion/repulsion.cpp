@@ -16,9 +16,6 @@
 namespace ist {
 namespace {
 
-// [m] A smaller smoothing would be lost in the rounding of float coordinates far from the origin.
-constexpr double kLeastSmoothing = 1e-3;
-
 // Of the smoothing: for an expansion, the nearest points of spheres are found that are this much
 // farther than the nearest pair. A sphere that is farther does not become the nearest one while
 // spheres move by half of this, KeptRepulsion::kMostKeptMotion.

@@ -6,8 +6,6 @@
 namespace ist {
 namespace {
 
-constexpr double kLeastSmoothing = 1e-3;  // [m] as in Repulsion
-
 bool is_of(const LinkPair& pair, std::size_t link) {
   return pair.first == link || pair.second == link;
 }

@@ -10,7 +10,7 @@ namespace ist {
 namespace {
 
 // So many nodes of each grid are measured again.
-constexpr std::size_t kSamples = 64;
+constexpr std::size_t kCheckedNodes = 64;
 // [m] More than double loses in the distance of a link's places.
 constexpr double kRounding = 1e-9;
 
@@ -41,7 +41,7 @@ class FieldSamples {
   // Calls is_right() with nodes spread over a grid, of which p_L_ and distance_ are known then.
   template <class IsRight>
   bool check(const DistanceField::Level& level, const IsRight& is_right) {
-    const std::size_t count = level.count(), step = std::max<std::size_t>(count / kSamples, 1);
+    const std::size_t count = level.count(), step = std::max<std::size_t>(count / kCheckedNodes, 1);
     for (std::size_t i = step / 2; i < count; i += step) {
       const auto x = static_cast<int>(i % static_cast<std::size_t>(level.size[0]));
       const std::size_t row = i / static_cast<std::size_t>(level.size[0]);

@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <variant>
 
+#include "internal/geometry/numbers.h"
+
 namespace ist {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // [m^2]
 double surface_area(const Shape& shape) {

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "internal/geometry/limits.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSlack = 1e-3;  // [m] for rounding, and for joints a little past their limits
 
 // [m] The largest distance between the origins of a joint's child and parent.

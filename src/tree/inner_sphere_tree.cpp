@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/tree/sphere_lanes.h"
 #include "internal/tree/sphere_tree_stack.h"
 #include "tree/cover_distance_kernel.h"
 #include "tree/inner_sphere_tree_builder.h"
@@ -11,12 +12,11 @@
 namespace ist {
 namespace {
 
-using Row = Eigen::Array<float, kSphereWidth, 1>;
-
 // The distances [m] of a point to the spheres of a node or a leaf.
 template <typename Spheres>
-Row sphere_distances(const Spheres& spheres, const float* radius, const Eigen::Vector3f& p) {
-  const auto row = [](const float* values) { return Eigen::Map<const Row>(values); };
+SphereLanes sphere_distances(const Spheres& spheres, const float* radius,
+                             const Eigen::Vector3f& p) {
+  const auto row = [](const float* values) { return Eigen::Map<const SphereLanes>(values); };
   return ((row(spheres.x) - p.x()).square() + (row(spheres.y) - p.y()).square() +
           (row(spheres.z) - p.z()).square())
              .sqrt() -
@@ -73,7 +73,7 @@ double InnerSphereTree::cover_distance(const Eigen::Vector3d& p_L, double stop_b
       continue;
     }
     const SphereNode& node = nodes_[static_cast<std::size_t>(entry.child)];
-    const Row distance = sphere_distances(node, node.radius, p);
+    const SphereLanes distance = sphere_distances(node, node.radius, p);
     const std::size_t first = stack.size();
     for (int k = 0; k < node.count; ++k) {
       if (distance[k] >= nearest) continue;

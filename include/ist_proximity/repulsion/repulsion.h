@@ -13,6 +13,10 @@
 
 namespace ist {
 
+/// [m] A smaller smoothing counts as this: it would be lost in the rounding of float coordinates
+/// far from the origin.
+constexpr double kLeastSmoothing = 1e-3;
+
 /// The repulsion vector of a link.
 struct RepulsionConfig {
   /// [m] > 0: from this distance on the vector is zero. Not more than the query's max_distance: a

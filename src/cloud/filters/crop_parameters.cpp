@@ -10,17 +10,17 @@
 namespace ist {
 namespace {
 
-constexpr double kFarFromSensor = 1000.0;  // [m]
-constexpr std::size_t kSamples = 256;      // points that the middle of a cloud is computed from
-constexpr double kAtOrigin = 1e-6;         // [m] nearer than any ray is measured
+constexpr double kFarFromSensor = 1000.0;   // [m]
+constexpr std::size_t kMiddlePoints = 256;  // points that the middle of a cloud is computed from
+constexpr double kAtOrigin = 1e-6;          // [m] nearer than any ray is measured
 
 // The middle of a cloud that is far from its sensor: the median, axis by axis, of some of its
 // points in the sensor frame [m]. Zero for other clouds.
 Eigen::Vector3d middle_of(const RawCloud& cloud, double min_range_sq, double max_range_sq) {
-  std::array<std::array<double, kSamples>, 3> samples;
+  std::array<std::array<double, kMiddlePoints>, 3> samples;
   std::size_t count = 0;
   const std::size_t n = cloud.size();
-  const std::size_t stride = (n + kSamples - 1) / kSamples;
+  const std::size_t stride = (n + kMiddlePoints - 1) / kMiddlePoints;
   for (std::size_t i = 0; i < n; i += stride) {
     const Eigen::Vector3d p = point_at(cloud, i / cloud.width, i % cloud.width);
     const double range_sq = p.squaredNorm();

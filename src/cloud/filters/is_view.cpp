@@ -1,15 +1,13 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <limits>
 
 #include "cloud/filters/view_filter.h"
 #include "cloud/format/point_reader.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // The median of the angles [rad] between neighbours, of some samples; inf: too few were measured.
 class NeighbourAngles {
@@ -21,7 +19,7 @@ class NeighbourAngles {
     if (norms > 0.0) values_[count_++] = p.cross(q).norm() / norms;
   }
   double median() {
-    if (count_ < kFewest) return kInf;
+    if (count_ < kFewest) return kInfinity;
     const auto middle = values_.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
     std::nth_element(values_.begin(), middle,
                      values_.begin() + static_cast<std::ptrdiff_t>(count_));
@@ -51,7 +49,6 @@ bool is_view(const RawCloud& cloud) {
     down.add(p, point_at(cloud, row + 1, column));
   }
   // All around, neighbours would be 2 pi / width and pi / height apart; cameras see less.
-  constexpr double kPi = 3.14159265358979323846;
   constexpr double kFewTimes = 2.0;
   return across.median() <= kFewTimes * 2.0 * kPi / static_cast<double>(cloud.width) &&
          down.median() <= kFewTimes * kPi / static_cast<double>(cloud.height);

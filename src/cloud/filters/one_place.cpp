@@ -6,7 +6,7 @@ namespace ist {
 namespace {
 
 // More than half of the points are hardly ever less than half of so many samples.
-constexpr std::size_t kSamples = 64;
+constexpr std::size_t kComparedPoints = 64;
 
 // Goes through every stride-th point in a range that counts.
 template <typename Visit>
@@ -24,7 +24,7 @@ void visit_points(const RawCloud& cloud, const CropParameters& crop, std::size_t
 std::uint32_t points_at_one_place(const RawCloud& cloud, const CropParameters& crop) {
   if (cloud.from_rays) return 0;
   // An odd stride: rows have even lengths, and samples are to spread over the columns.
-  const std::size_t stride = cloud.size() / kSamples | 1U;
+  const std::size_t stride = cloud.size() / kComparedPoints | 1U;
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
   std::size_t votes = 0;  // the only place that can have more than half of the samples wins
   visit_points(cloud, crop, stride, [&](const Eigen::Vector3d& p) {

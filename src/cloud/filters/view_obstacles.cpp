@@ -5,16 +5,14 @@
 #include <array>
 #include <bitset>
 #include <cmath>
-#include <limits>
 
 #include "cloud/filters/crop.h"
 #include "cloud/filters/view_filter.h"
 #include "cloud/format/point_reader.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // [standard deviations] A mean that is more in front is an obstacle next to another one.
 constexpr double kBesideObstacle = 3.0;
@@ -95,7 +93,7 @@ void ViewFilter::find_windows(std::size_t index) {
   const bool whole = is_in_front(sum, variance, count, tolerance, kCertain);
   for (Tile* tile : window) {
     if (tile == nullptr || tile->is_obstacle) continue;
-    const double own = tile == &tiles_[index] ? kCertain : kInf;
+    const double own = tile == &tiles_[index] ? kCertain : kInfinity;
     const double sigmas = whole ? 0.5 * kBesideObstacle : own;
     tile->is_obstacle =
         std::isfinite(sigmas) &&

@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "cloud/filters/view_filter.h"
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/ray_cast.h"
 #include "internal/geometry/solid_queries.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // Noise never pulls a mean back by more: a mixed pixel or a shadow is no evidence of free space.
 constexpr double kClipped = 3.0;
@@ -29,16 +27,17 @@ bool is_farther(const SelfFilter::Link& link, const Eigen::Vector3d& p_L, double
 
 // [m] The distance of a point to the surface of a link; inf where it is more than `limit`.
 double distance_within(const SelfFilter::Link& link, const Eigen::Vector3d& p_L, double limit) {
-  return is_farther(link, p_L, limit) ? kInf : distance_outside(*link.solid, p_L, limit).distance;
+  return is_farther(link, p_L, limit) ? kInfinity
+                                      : distance_outside(*link.solid, p_L, limit).distance;
 }
 
 // [m] The nearest approach of a ray to the surface of a link near its point at t, where that is
 // within `limit` [m] and the ray comes nearest before `last`; else inf.
 double approach_within(const SelfFilter::Link& link, const Eigen::Vector3d& o_L,
                        const Eigen::Vector3d& d_L, double t, double last, double limit) {
-  if (is_farther(link, o_L + t * d_L, limit)) return kInf;
+  if (is_farther(link, o_L + t * d_L, limit)) return kInfinity;
   const RayApproach near = nearest_approach(*link.solid, o_L, d_L, t, limit);
-  return near.t <= last ? near.distance : kInf;
+  return near.t <= last ? near.distance : kInfinity;
 }
 
 }  // namespace

@@ -3,14 +3,12 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 
+#include "internal/geometry/numbers.h"
 #include "ist_proximity/cloud/depth_image.h"
 
 namespace ist {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // The depth of a pixel in the image's unit; NaN where nothing is known.
 struct Integers {

@@ -6,13 +6,12 @@
 #include <sstream>
 
 #include "internal/cloud/largest_range.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
 
 constexpr double kTwoTurns = 12.6;  // [rad] and a little more
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::string fault(const char* member, double value, const char* expected) {
   std::ostringstream text;

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kSampledBlocks = 64;
 
 // Numbers of the sampled blocks of 4 x 4 pixels.
-class Samples {
+class BlockValues {
  public:
   void add(float value) { values_[size_++] = value; }
   std::size_t size() const { return size_; }
@@ -36,7 +36,7 @@ bool is_organized(const RawCloud& cloud, const CropParameters& crop) {
   // Not a divisor of the row: the samples are to be spread over the columns, too.
   const std::size_t step = std::max<std::size_t>(1, blocks / kSampledBlocks) | 1U;
   std::array<CropBatch, kTileSide> rows;
-  Samples size_sq, x, y, z;
+  BlockValues size_sq, x, y, z;
   std::size_t kept = 0, received = 0;
   IngestCounts unused;
   for (std::size_t i = 0; i < blocks; i += step) {

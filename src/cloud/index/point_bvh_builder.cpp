@@ -10,7 +10,6 @@
 namespace ist {
 namespace {
 
-constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
 // A message is not kept for fewer lazy tiles than one in this many: it is about as large as all
 // tiles.
 constexpr std::size_t kLazyShare = 16;
@@ -32,7 +31,7 @@ void remove(std::uint32_t dropped, PointTile* tile) {
 
 // Whether neighbouring tiles are to be a node: they fill most of it and are close together.
 bool is_node_worthwhile(const HierarchyChild* tiles, std::size_t count) {
-  if (count < kWidth / 2 || count > kWidth) return false;
+  if (count < kTilePoints / 2 || count > kTilePoints) return false;
   PaddedBox bounds = tiles[0].box;
   float sum = 0.0F;
   for (std::size_t i = 0; i < count; ++i) {
@@ -137,7 +136,7 @@ void PointBvhBuilder::add_lazy_node(const BoxNode& boxes, const std::uint32_t* f
   BoxNode& node = bvh_->nodes_.back();
   node.count = kPointWidth;
   for (int k = 0; k < kPointWidth; ++k) node.child[k] = ~(static_cast<std::int32_t>(used_) + k);
-  append_lazy(first_pixels, kWidth);
+  append_lazy(first_pixels, kTilePoints);
 }
 
 void PointBvhBuilder::end_group() {

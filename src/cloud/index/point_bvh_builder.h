@@ -16,6 +16,8 @@
 
 namespace ist {
 
+constexpr auto kTilePoints = static_cast<std::size_t>(kPointWidth);
+
 /// Builds the data of point indices; keeps its working memory, so a steady stream of clouds
 /// allocates nothing. Not thread safe.
 ///

@@ -12,8 +12,7 @@
 namespace ist {
 namespace {
 
-constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
-constexpr std::size_t kEnough = 4 * kWidth;  // tiles for well filled nodes
+constexpr std::size_t kEnough = 4 * kTilePoints;  // tiles for well filled nodes
 // Points that share a box, at most: a query that looks there looks at all of them.
 constexpr std::size_t kMostUnsliced = 4096;
 
@@ -42,7 +41,7 @@ void PointBvhBuilder::for_each_slice(std::size_t n, std::size_t part, const Visi
   constexpr std::size_t kAllAtOnce = 4;
   const std::size_t parts = (n + part - 1) / part;
   const auto root = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(parts))));
-  const std::size_t slices = part == kWidth || parts > kAllAtOnce ? root : parts;
+  const std::size_t slices = part == kTilePoints || parts > kAllAtOnce ? root : parts;
   for (std::size_t i = 0; i < slices; ++i) {
     visit(parts * i / slices * part, std::min(parts * (i + 1) / slices * part, n));
   }
@@ -51,12 +50,12 @@ void PointBvhBuilder::for_each_slice(std::size_t n, std::size_t part, const Visi
 // Adds points in the order in which they come.
 // @param box  of all of them
 void PointBvhBuilder::add_unsliced(const CloudPoint* points, std::size_t n, const PaddedBox& box) {
-  PointTile* tiles = next_tiles((n + kWidth - 1) / kWidth);
+  PointTile* tiles = next_tiles((n + kTilePoints - 1) / kTilePoints);
   for (std::size_t count = fill_tiles(points, n, tiles); count > 0; --count) {
     bvh_->size_ += static_cast<std::size_t>(bvh_->tiles_[used_].count);
     ungrouped_.push_back({box, ~static_cast<std::int32_t>(used_)});
     ++used_;
-    if (ungrouped_.size() - group_begin_ == kWidth) end_group();
+    if (ungrouped_.size() - group_begin_ == kTilePoints) end_group();
   }
 }
 
@@ -115,7 +114,7 @@ void PointBvhBuilder::add_points(CloudPoint* points, CloudPoint* spare, std::siz
 
 // Slices the points of a batch until sixteen consecutive ones are a tile.
 void PointBvhBuilder::slice_into_tiles(CloudPoint* points, CloudPoint* spare, std::size_t n) {
-  if (n <= kWidth || !slicer_.sort(points, n, spare)) {
+  if (n <= kTilePoints || !slicer_.sort(points, n, spare)) {
     make_tiles(points, n, &batch_);
     return;
   }
@@ -124,12 +123,12 @@ void PointBvhBuilder::slice_into_tiles(CloudPoint* points, CloudPoint* spare, st
   constexpr std::size_t kFewTiles = 4;
   constexpr float kWidest = 2.0F;
   const BoxShape& shape = slicer_.shape();
-  const float width = shape.second * static_cast<float>(n) / static_cast<float>(kWidth);
-  const bool is_narrow = n <= kFewTiles * kWidth || width <= kWidest * shape.longest;
+  const float width = shape.second * static_cast<float>(n) / static_cast<float>(kTilePoints);
+  const bool is_narrow = n <= kFewTiles * kTilePoints || width <= kWidest * shape.longest;
   if (is_narrow && slicer_.dense_end() == 0) {
     make_tiles(spare, n, &batch_);
   } else {
-    for_each_slice(n, kWidth, [&](std::size_t begin, std::size_t end) {
+    for_each_slice(n, kTilePoints, [&](std::size_t begin, std::size_t end) {
       slice_into_tiles(spare + begin, points + begin, end - begin);
     });
   }
@@ -140,16 +139,17 @@ void PointBvhBuilder::add_batch(const Filters& filters) {
   const std::size_t count = batch_.count;
   const PointTile* tiles = batch_.tiles;
   bool is_clear = true;
-  for (std::size_t i = 0; i < count; i += kWidth) {
-    BoxNode& boxes = batch_.boxes[i / kWidth];
-    boxes.count = static_cast<std::int32_t>(std::min(count - i, kWidth));
+  for (std::size_t i = 0; i < count; i += kTilePoints) {
+    BoxNode& boxes = batch_.boxes[i / kTilePoints];
+    boxes.count = static_cast<std::int32_t>(std::min(count - i, kTilePoints));
     is_clear = is_clear && !may_drop_any(filters, bounds_of(boxes));
   }
   if (!is_clear) {
     filtered_.assign(tiles, tiles + count);
   }
   // Splits may have made more tiles than fit whole nodes: groups of about equal size.
-  const std::size_t nodes = (count + kWidth - 1) / kWidth, each = (count + nodes - 1) / nodes;
+  const std::size_t nodes = (count + kTilePoints - 1) / kTilePoints,
+                    each = (count + nodes - 1) / nodes;
   for (std::size_t begin = 0; begin < count; begin += each) {
     const std::size_t end = std::min(begin + each, count);
     if (is_clear) {
@@ -163,9 +163,9 @@ void PointBvhBuilder::add_batch(const Filters& filters) {
 
 void PointBvhBuilder::add_clear_tiles(std::size_t begin, std::size_t end) {
   for (std::size_t i = begin; i < end;) {
-    const std::size_t slot = i % kWidth, here = std::min(kWidth - slot, end - i);
+    const std::size_t slot = i % kTilePoints, here = std::min(kTilePoints - slot, end - i);
     const auto which = static_cast<std::uint32_t>(((std::size_t{1} << here) - 1) << slot);
-    add_loaded_tiles(batch_.boxes[i / kWidth], which);
+    add_loaded_tiles(batch_.boxes[i / kTilePoints], which);
     i += here;
   }
 }
@@ -175,7 +175,7 @@ void PointBvhBuilder::add_filtered_tiles(std::size_t begin, std::size_t end,
                                          const Filters& filters) {
   static const PointFilter kDropNone;
   const auto box_of_tile = [this](std::size_t i) {
-    return box_in(batch_.boxes[i / kWidth], static_cast<int>(i % kWidth));
+    return box_in(batch_.boxes[i / kTilePoints], static_cast<int>(i % kTilePoints));
   };
   PaddedBox all = box_of_tile(begin);
   for (std::size_t i = begin + 1; i < end; ++i) all.extend(box_of_tile(i));
@@ -204,9 +204,10 @@ void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* poi
 // Allocates far more than needed: the numbers of nodes and tiles differ from cloud to cloud of a
 // stream, and memory is to be allocated once.
 void PointBvhBuilder::reserve() {
-  const std::size_t nodes = cells_.size() / (4 * kWidth) + kWidth;
+  const std::size_t nodes = cells_.size() / (4 * kTilePoints) + kTilePoints;
   if (bvh_->nodes_.capacity() < nodes) bvh_->nodes_.reserve(2 * nodes);
-  const std::size_t tiles = 2 * cells_.size() / kWidth + kWidth;  // pages are taken when written
+  const std::size_t tiles =
+      2 * cells_.size() / kTilePoints + kTilePoints;  // pages are taken when written
   if (bvh_->tiles_.capacity() < tiles) {
     bvh_->tiles_.clear();
     bvh_->tiles_.reserve(tiles + tiles / 2);

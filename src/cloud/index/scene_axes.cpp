@@ -91,7 +91,7 @@ Normals sample_organized(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
 }
 
 // Some points of an unorganized cloud, in the message's order.
-struct Samples {
+struct SampledPoints {
   static constexpr std::size_t kBlock = 16;
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   static_assert(kPoints % kBlock == 0, "whole blocks");
@@ -101,7 +101,7 @@ struct Samples {
   std::array<float, kPoints> x, y, z;
   std::size_t size = 0;
 
-  Samples(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
+  SampledPoints(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
     // An odd stride: rows of a scanner have even lengths, and samples are to spread over the
     // columns.
     const std::size_t stride = std::max<std::size_t>(1, cloud.size() / kPoints) | 1U;
@@ -151,7 +151,7 @@ struct Samples {
 // Normals of planes through neighbouring points of an unorganized cloud.
 Normals sample_unorganized(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
   Normals normals;
-  const Samples samples(cloud, R_FS);
+  const SampledPoints samples(cloud, R_FS);
   if (samples.size < 8 * kNeighbours) return normals;
   for (std::size_t i = 0; i < kSeeds; ++i) {
     Eigen::Matrix<float, 3, static_cast<int>(kNeighbours)> points;

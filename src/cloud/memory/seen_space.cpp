@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <unordered_map>
@@ -10,18 +9,16 @@
 #include "cloud/memory/block_bits.h"
 #include "cloud/memory/merge_boxes.h"
 #include "cloud/memory/voxel_map_access.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
-namespace {
-
-struct SeenBlock {
-  BlockBits known{};
-  double newest = -std::numeric_limits<double>::infinity();  // [s]
-};
-
-}  // namespace
 
 struct SeenSpace::Impl {
+  struct SeenBlock {
+    BlockBits known{};
+    double newest = -kInfinity;  // [s]
+  };
+
   VoxelScale scale{1.0};
   bool is_empty = true;  // no memory has been added
   std::unordered_map<std::uint64_t, SeenBlock> blocks;
@@ -98,7 +95,7 @@ void SeenSpace::add(const MemoryMap& map) {
   impl_->scale = voxels.scale();
   for (std::size_t i = 0; i < voxels.blocks().size(); ++i) {
     const VoxelBlock& block = voxels.blocks()[i];
-    SeenBlock& seen = impl_->blocks[block.id];
+    Impl::SeenBlock& seen = impl_->blocks[block.id];
     for (int z = 0; z < kBlockSide; ++z) seen.known[z] |= block.known[z];
     seen.newest = std::max(seen.newest, voxels.time(block.newest));
   }
@@ -106,9 +103,9 @@ void SeenSpace::add(const MemoryMap& map) {
 
 double SeenSpace::time_seen(const Eigen::Vector3d& p_M) const {
   VoxelKey key;
-  const SeenBlock* block = impl_->scale.key(p_M, &key) ? impl_->find(block_id(key)) : nullptr;
+  const Impl::SeenBlock* block = impl_->scale.key(p_M, &key) ? impl_->find(block_id(key)) : nullptr;
   const bool is_known = block != nullptr && test_bit(block->known, place_in_block(key));
-  return is_known ? block->newest : std::numeric_limits<double>::quiet_NaN();
+  return is_known ? block->newest : kNaN;
 }
 
 bool SeenSpace::unknown_boxes(const Eigen::Vector3d& center_M, double radius, std::size_t max_boxes,

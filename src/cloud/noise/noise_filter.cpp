@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstring>
-#include <limits>
 #include <vector>
 
 #include "cloud/format/point_reader.h"
@@ -13,11 +12,10 @@
 #include "internal/bvh/traversal_stack.h"
 #include "internal/cloud/largest_range.h"
 #include "internal/cloud/point_bvh.h"
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // Boxes are in float: relative to the largest coordinate, they may be this far off.
 constexpr float kBoxSlack = 1e-6F;

@@ -1,14 +1,8 @@
 #include "proximity/coherence/link_bound.h"
 
-#include <limits>
+#include "internal/geometry/numbers.h"
 
 namespace ist {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
-
 LinkBound::LinkBound(const LinkModel& link)
     : displacement_(link), is_closed_(link.solid.is_closed()) {}
 

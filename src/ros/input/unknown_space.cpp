@@ -24,7 +24,7 @@ constexpr double kWorkingShare = 0.25;
 // One million boxes take 0.5 s and 150 MB. Where there are more, the region becomes smaller.
 constexpr std::size_t kMaxBoxes = 1000000;
 constexpr double kSmaller = 0.8;
-constexpr std::chrono::milliseconds kPublicationPeriod(500);
+constexpr std::chrono::milliseconds kMarkerPeriod(500);
 // [s] Stamps are not so far ahead of the clock, unless it has gone back (see SourceMemory).
 constexpr double kBeganAnew = 1.0;
 
@@ -124,7 +124,7 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
 void UnknownSpaceWatch::publish_when_due(const VoxelBoxes& boxes, const KnownSpace& known) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_publication_ || publisher_.getNumSubscribers() == 0) return;
-  next_publication_ = now + kPublicationPeriod;
+  next_publication_ = now + kMarkerPeriod;
   std_msgs::Header header;  // its stamp is 0, so rviz takes the newest transform
   header.frame_id = known.frame;
   publish_message(publisher_, unseen_markers(boxes, known.links, drawn_range_, header));

@@ -17,7 +17,7 @@ using Kind = WorldFaultKind;
 
 const ros::WallDuration kPoll(0.02);
 // Messages change the world, so none may be lost.
-constexpr std::uint32_t kQueueSize = 1000;
+constexpr std::uint32_t kWorldQueueSize = 1000;
 
 }  // namespace
 
@@ -32,7 +32,7 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
   markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("world/" + config.name, 1, true);
   nh.setCallbackQueue(&queue_);
   if (config.world.has_topic) {
-    subscribers_ = {nh.subscribe(config.topic, kQueueSize, &WorldSource::receive, this,
+    subscribers_ = {nh.subscribe(config.topic, kWorldQueueSize, &WorldSource::receive, this,
                                  ros::TransportHints().tcpNoDelay())};
   }
   start();

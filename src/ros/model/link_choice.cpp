@@ -13,10 +13,6 @@ bool holds(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-void add_name(const std::string& name, std::vector<std::string>* names) {
-  if (!holds(*names, name)) names->push_back(name);
-}
-
 std::string around(const CoarseHull& hull) { return hull.link + " (around " + hull.enclosed + ")"; }
 
 bool has_enabled_pair(const CollisionRules& rules, const std::string& link) {
@@ -118,6 +114,10 @@ void choose_filtering(const RobotDescription& robot, const std::vector<CoarseHul
 }
 
 }  // namespace
+
+void add_name(const std::string& name, std::vector<std::string>* names) {
+  if (!holds(*names, name)) names->push_back(name);
+}
 
 std::vector<std::string> LinkChoice::packed() const {
   std::vector<std::string> links = monitored;

@@ -23,6 +23,9 @@ struct LinkChoice {
   std::vector<std::string> packed() const;
 };
 
+/// Adds a name that is not among them yet.
+void add_name(const std::string& name, std::vector<std::string>* names);
+
 /// Chooses the links: those of ~links, or else all with geometry but for coarse hulls that the SRDF
 /// disables by default. Those of ~self_filter_links filter, or else the monitored ones; for a
 /// coarse hull the link that it is drawn around does: a link that does not filter shows in contact

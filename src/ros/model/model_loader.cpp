@@ -27,10 +27,6 @@ std::string sentence_of(const ModelProgress& progress) {
          format_text("), %.0f %% of the robot done", std::floor(100.0 * progress.fraction));
 }
 
-void add_name(const std::string& name, std::vector<std::string>* names) {
-  if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
-}
-
 }  // namespace
 
 ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)

@@ -1,18 +1,17 @@
 #include "ros/parameters/source_parameters.h"
 
 #include <algorithm>
-#include <limits>
 #include <map>
 #include <string>
 
+#include "internal/geometry/numbers.h"
 #include "ros/common/text.h"
 
 namespace ist {
 namespace {
 
 using Footprint = ExtentConfig::Footprint;
-constexpr double kInf = std::numeric_limits<double>::infinity();
-const Range kTime = Range::positive("s", kInf, true);
+const Range kTime = Range::positive("s", kInfinity, true);
 const Range kMetre = Range::non_negative("m", 1.0);
 
 /// The table of what a sensor's points have to pass: ranges, self-filter, signs of failure.
@@ -23,8 +22,8 @@ std::vector<Parameter> sensor_parameters(const std::string& at, SourceConfig* so
   constexpr double kSmallest = 1e-6;  // errors of a sensor's pose are never less
   return {
       {at + "min_range", &ingest.min_range, Range::non_negative("m", 1e4)},
-      {at + "max_range", &ingest.max_range, Range::positive("m", kInf, true)},
-      {at + "sensor_range", &ingest.sensor_range, Range::positive("m", kInf, true)},
+      {at + "max_range", &ingest.max_range, Range::positive("m", kInfinity, true)},
+      {at + "sensor_range", &ingest.sensor_range, Range::positive("m", kInfinity, true)},
       {at + "min_measured", &source->min_measured, {"", 0.0, 1.0}},
       {at + "frozen_after", &source->frozen_after, kTime},
       {at + "self_filter", &ingest.self_filter},
@@ -192,7 +191,7 @@ void require_extent(ParameterReader* reader, const std::string& at, double max_r
 /// The same for a map, whose boxes have one radius.
 void require_map_extent(ParameterReader* reader, const std::string& at, ExtentConfig* config) {
   if (config->is_zero()) return;
-  const PointExtent extent = point_extent(*config, 0.0, kInf);
+  const PointExtent extent = point_extent(*config, 0.0, kInfinity);
   if (extent.linear > 0.0 || extent.quadratic > 0.0 || config->footprint == Footprint::kCamera) {
     reader->add_error(at + "noise",
                       "and footprint grow with the range, but a map has no sensor from which "
@@ -201,7 +200,7 @@ void require_map_extent(ParameterReader* reader, const std::string& at, ExtentCo
     *config = ExtentConfig();
     return;
   }
-  require_extent(reader, at, kInf, config);
+  require_extent(reader, at, kInfinity, config);
 }
 
 // Each memory has a file of its own.

@@ -1,9 +1,9 @@
 #include <Eigen/Geometry>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "internal/geometry/limits.h"
+#include "internal/geometry/numbers.h"
 #include "ist_proximity/proximity/world_file.h"
 #include "ros/common/text.h"
 #include "ros/parameters/source_parameters.h"
@@ -11,7 +11,6 @@
 namespace ist {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
 const Range kSize = Range::positive("m", kMaxLength);
 const Range kPosition{"m", -kMaxLength, kMaxLength};
 const Range kMargin = Range::non_negative("m", kMaxLength);
@@ -149,9 +148,9 @@ void read_world(ParameterReader* reader, const std::string& at, SourceConfig* so
   if (reader->has(at + "file"))
     read_path(reader, at + "file", "/home/robot/cell.scene", &source->file);
   world.has_topic = reader->has(at + "topic");
-  source->timeout = kInf;  // objects are sent when they change
+  source->timeout = kInfinity;  // objects are sent when they change
   if (world.has_topic) {
-    reader->read_all({{at + "timeout", &source->timeout, Range::positive("s", kInf, true)},
+    reader->read_all({{at + "timeout", &source->timeout, Range::positive("s", kInfinity, true)},
                       {at + "max_leaves", &source->map.max_leaves, {"", 1.0, 5e7}}});
   }
   if (!world.has_topic && source->file.empty() && !reader->has(at + "objects") &&

@@ -7,10 +7,10 @@
 namespace ist {
 namespace {
 
-constexpr double kAgreement = 0.01;     // [m, rad]
-constexpr double kAcceleration = 50.0;  // [m/s2, rad/s2] more than robots and people have
-constexpr double kMaxInterval = 1.0;    // [s] between two samples of one publisher
-constexpr double kMaxSilence = 10.0;    // [s] after which a publisher is forgotten for a new one
+constexpr double kSamePlace = 0.01;       // [m, rad]
+constexpr double kAcceleration = 50.0;    // [m/s2, rad/s2] more than robots and people have
+constexpr double kMaxInterval = 1.0;      // [s] between two samples of one publisher
+constexpr double kForgottenAfter = 10.0;  // [s] after which a publisher is forgotten for a new one
 
 /// A quaternion and its negative are the same rotation: gives the one that is nearer to another.
 PublisherTrack::Values aligned(PublisherTrack::Values values, const PublisherTrack::Values& other) {
@@ -30,7 +30,7 @@ bool differs(const PublisherTrack::Values& values, const PublisherTrack::Values&
 bool PublisherTrack::disagrees(const Publisher& mine, const Sample& sample) {
   const Sample &last = mine.samples[0], &before = mine.samples[1];
   if (sample.stamp.isZero() || sample.stamp > last.stamp) return false;
-  if (sample.stamp == last.stamp) return differs(sample.values, last.values, kAgreement);
+  if (sample.stamp == last.stamp) return differs(sample.values, last.values, kSamePlace);
   const double after = seconds_between(sample.stamp, last.stamp);
   const double interval = seconds_between(before.stamp, last.stamp);
   if (!before.stamp.isZero() && before.stamp <= sample.stamp && interval <= kMaxInterval) {
@@ -38,11 +38,11 @@ bool PublisherTrack::disagrees(const Publisher& mine, const Sample& sample) {
     const Values expected =
         (1.0 - share) * last.values + share * aligned(before.values, last.values);
     return differs(sample.values, expected,
-                   kAgreement + 0.5 * kAcceleration * after * (interval - after));
+                   kSamePlace + 0.5 * kAcceleration * after * (interval - after));
   }
   if (sample.stamp < mine.stays.stamp || std::max(after, mine.longest) > kMaxInterval) return false;
   const double excursion = 0.125 * kAcceleration * mine.longest * mine.longest;
-  return differs(sample.values, last.values, 2.0 * kAgreement + excursion);
+  return differs(sample.values, last.values, 2.0 * kSamePlace + excursion);
 }
 
 bool PublisherTrack::add(const std::string& publisher, const ros::Time& stamp, const Values& values,
@@ -51,7 +51,7 @@ bool PublisherTrack::add(const std::string& publisher, const ros::Time& stamp, c
                           [&](const Publisher& one) { return one.name == publisher; });
   if (own == publishers_.end()) {
     const auto is_silent = [&](const Publisher& one) {
-      return seconds_between(one.samples[0].stamp, stamp) > kMaxSilence;
+      return seconds_between(one.samples[0].stamp, stamp) > kForgottenAfter;
     };
     publishers_.erase(std::remove_if(publishers_.begin(), publishers_.end(), is_silent),
                       publishers_.end());
@@ -60,7 +60,7 @@ bool PublisherTrack::add(const std::string& publisher, const ros::Time& stamp, c
     own->name = publisher;
   }
   if (stamp < own->samples[0].stamp) return false;  // out of order
-  if (own->stays.stamp.isZero() || differs(values, own->stays.values, kAgreement)) {
+  if (own->stays.stamp.isZero() || differs(values, own->stays.values, kSamePlace)) {
     own->stays = {stamp, values};
     own->longest = 0.0;
   } else {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <limits>
 
+#include "internal/geometry/numbers.h"
 #include "ros/common/memory.h"
 
 namespace ist {
@@ -13,7 +13,6 @@ using ist_proximity::ProximityArray;
 
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
 // An answer with more states takes megabytes.
 constexpr std::size_t kManyStates = 1000;
 constexpr std::size_t kMaxAnswers = 100000;          // of one request: they take 60 MB
@@ -214,7 +213,7 @@ void note_impacts(const std::vector<ImpactTime>& impacts, double begin, std::vec
     if (std::isfinite(impacts[i].time)) {
       (*first)[i] = begin + impacts[i].time;
       (*wanted)[i] = false;  // the request asks for the first contact only
-    } else if (std::isnan(impacts[i].time) && (*first)[i] == kInf) {
+    } else if (std::isnan(impacts[i].time) && (*first)[i] == kInfinity) {
       (*first)[i] = impacts[i].time;
       (*wanted)[i] = false;
     }
@@ -237,7 +236,7 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   }
   std::vector<double> first;
   first.reserve(wanted.size());
-  for (const bool one : wanted) first.push_back(one ? kInf : std::nan(""));
+  for (const bool one : wanted) first.push_back(one ? kInfinity : std::nan(""));
   if (request.self_proximity != 0) self_.begin_motion();
   JointPoses still;  // nothing is known of the motion while the root link has no pose
   if (poses_->is_root_known()) still = poses_->joints();

@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "internal/geometry/numbers.h"
 #include "ros/common/eigen_conversion.h"
 #include "ros/services/pair_choice.h"
 
 namespace ist {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 ist_proximity::LinkPairProximity to_message(const RobotModel& robot, const LinkPair& pair,
                                             const PairProximity& result) {
@@ -80,7 +78,7 @@ void SelfQueryAnswer::begin_motion() {
   }
   wanted_.assign(query_->pairs().size(), false);
   for (const std::size_t i : pairs_) wanted_[i] = true;
-  first_.assign(pairs_.size(), kInf);
+  first_.assign(pairs_.size(), kInfinity);
 }
 
 void SelfQueryAnswer::advance(const JointMotion& motion, double start, const JointPoses& still,
@@ -90,7 +88,7 @@ void SelfQueryAnswer::advance(const JointMotion& motion, double start, const Joi
   impacts_->run(motion, still, wanted_, &impacts);
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const std::size_t pair = pairs_[k];
-    if (!wanted_[pair] || impacts[pair].time == kInf) continue;
+    if (!wanted_[pair] || impacts[pair].time == kInfinity) continue;
     first_[k] = start + impacts[pair].time;  // NaN: not known, and neither is what comes later
     wanted_[pair] = false;
   }
