@@ -17,9 +17,11 @@ find_package(catkin REQUIRED COMPONENTS
   tf2_msgs
   tf2_ros
   topic_tools
+  trajectory_msgs
   visualization_msgs)
 
 add_message_files(DIRECTORY msg FILES
+  FilterState.msg
   JointRepulsion.msg
   LinkPair.msg
   LinkPairProximity.msg
@@ -55,5 +57,6 @@ catkin_package(
     tf2_msgs
     tf2_ros
     topic_tools
+    trajectory_msgs
     visualization_msgs
   DEPENDS EIGEN3)

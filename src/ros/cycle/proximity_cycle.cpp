@@ -35,6 +35,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
     : model_(std::move(model)),
       packed_(model_->robot),
       robot_(*model_->robot),
+      boxes_(link_boxes(robot_)),
       fixed_frame_(fixed_frame_of(*model_, config)),
       pose_source_(std::move(poses)),
       pose_timeout_(config.pose_timeout),
@@ -307,6 +308,7 @@ void ProximityCycle::fill_links(ProximityArray* message) {
                                   is_world ? worlds_.nearest(result) : selection_.nearest(result)),
                 source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
                 &message->links[k]);
+    assign_box(boxes_[i].box_L, &message->links[k]);
     if (unknown_space_ && result.state != LinkState::kUnknown) {
       assign_unknown_space(unknown_space_->answer(i).seen, unknown_space_->answer(i).lower_bound,
                            unknown_space_->answer(i).direction, unknown_is_obstacle_,

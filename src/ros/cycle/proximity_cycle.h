@@ -11,6 +11,7 @@
 
 #include "internal/proximity/carried_worlds.h"
 #include "internal/repulsion/coherent_queries.h"
+#include "ist_proximity/control/constraint_rows.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
@@ -124,6 +125,7 @@ class ProximityCycle {
   const std::shared_ptr<const ModelState> model_;
   std::shared_ptr<const RobotModel> packed_;  ///< the same robot with the newest packings
   const RobotModel& robot_;
+  const std::vector<LinkBox> boxes_;  ///< by link
   std::string fixed_frame_;
   std::unique_ptr<PoseSource> pose_source_;
   const double pose_timeout_;  ///< [s]

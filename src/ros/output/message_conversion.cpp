@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "internal/geometry/numbers.h"
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/ros_time.h"
 
@@ -12,8 +13,6 @@ namespace {
 
 using LinkMessage = ist_proximity::LinkProximity;
 using ist_proximity::ProximityArray;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 void assign_closing(const ClosingRates& closing, LinkMessage* message) {
   message->closing_speed = closing.total;
@@ -37,6 +36,12 @@ void assign_interval(const LinkProximity& result, LinkMessage* message) {
 }
 
 }  // namespace
+
+void assign_box(const Eigen::AlignedBox3d& box_L, LinkMessage* message) {
+  const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(kNaN);
+  assign(box_L.isEmpty() ? nowhere : Eigen::Vector3d(box_L.center()), &message->box_center);
+  assign(box_L.isEmpty() ? nowhere : Eigen::Vector3d(box_L.sizes()), &message->box_size);
+}
 
 LinkMessage unknown_link(const std::string& name) {
   LinkMessage message;
@@ -63,6 +68,7 @@ void assign_link(const std::string& name, const LinkProximity& result,
   assign_closing(closing, message);
   const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(kNaN);
   assign_unknown_space({}, kNaN, nowhere, false, message);
+  assign_box({}, message);
   message->source.assign(source, 0, result.state >= LinkState::kNear ? source.size() : 0);
 }
 

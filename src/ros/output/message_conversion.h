@@ -30,6 +30,10 @@ void assign_link(const std::string& name, const LinkProximity& result,
                  const ClosingRates& closing, const std::string& source,
                  ist_proximity::LinkProximity* message);
 
+/// Adds the box of the link's geometry.
+/// @param box_L  [m] in the link's frame; empty: not known
+void assign_box(const Eigen::AlignedBox3d& box_L, ist_proximity::LinkProximity* message);
+
 /// Adds what is known of unknown space.
 /// @param lower_bound    [m] of the distance to it
 /// @param direction      towards it

@@ -1,0 +1,327 @@
+#include "ros/filter/command_filter.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+
+#include "internal/geometry/numbers.h"
+#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/robot/robot_description.h"
+#include "ros/common/eigen_conversion.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/publish.h"
+#include "ros/common/ros_time.h"
+#include "ros/common/text.h"
+
+namespace ist {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using ist_proximity::FilterState;
+
+// [s] Over which the speed of joints that are not commanded is measured.
+constexpr double kSpeedWindow = 0.05;
+
+FilterConfig read_config(const ros::NodeHandle& private_nh) {
+  XmlRpc::XmlRpcValue tree;
+  ros::param::get(private_nh.getNamespace(), tree);
+  std::vector<std::string> errors, warnings;
+  FilterConfig config = read_filter_config(tree, &errors, &warnings);
+  for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
+  if (!errors.empty()) throw std::invalid_argument(join(errors, "\n"));
+  return config;
+}
+
+void set_stamp(const ros::Time& now, trajectory_msgs::JointTrajectory* message) {
+  // A stamp of 0 means "now" to those who follow a trajectory.
+  if (!message->header.stamp.isZero()) message->header.stamp = now;
+}
+void set_stamp(const ros::Time& now, sensor_msgs::JointState* message) {
+  message->header.stamp = now;
+}
+void set_stamp(const ros::Time&, std_msgs::Float64MultiArray*) {}
+
+}  // namespace
+
+CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
+    : nh_(nh), private_nh_(private_nh), config_(read_config(private_nh)), listener_(tf_, nh_) {
+  if (!nh_.searchParam(config_.robot_description, description_)) {
+    description_ = config_.robot_description;
+  }
+  state_ = private_nh_.advertise<FilterState>("filter_state", 10);
+  read_robot();
+  answers_ = nh_.subscribe("proximity/proximity", 1, &CommandFilter::take_answers, this,
+                           ros::TransportHints().tcpNoDelay());
+  joints_ = nh_.subscribe("joint_states", 50, &CommandFilter::take_joints, this,
+                          ros::TransportHints().tcpNoDelay());
+  if (config_.command_type == "std_msgs/Float64MultiArray") {
+    subscribe<std_msgs::Float64MultiArray>();
+  } else if (config_.command_type == "sensor_msgs/JointState") {
+    subscribe<sensor_msgs::JointState>();
+  } else {
+    subscribe<trajectory_msgs::JointTrajectory>();
+  }
+  timer_ = nh_.createWallTimer(ros::WallDuration(1.0 / config_.rate),
+                               [this](const ros::WallTimerEvent&) { on_timer(); });
+}
+
+CommandFilter::~CommandFilter() {
+  timer_.stop();
+  command_.shutdown();
+  if (halt_) halt_("the filter ends");
+}
+
+template <class Message>
+void CommandFilter::subscribe() {
+  safe_command_ = private_nh_.advertise<Message>("safe_command", 1);
+  command_ = private_nh_.subscribe<Message>(
+      "command", 1,
+      boost::function<void(const boost::shared_ptr<const Message>&)>(
+          [this](const boost::shared_ptr<const Message>& message) { receive(*message); }),
+      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
+}
+
+template <class Message>
+void CommandFilter::receive(const Message& message) {
+  const auto begin = Clock::now();
+  clock_has_gone_back();
+  const auto q = [this](const std::string& joint) { return position_of(joint); };
+  const JointCommand command = read_command(message, config_.joints, q);
+  const auto give = [this, q, message, command](const std::vector<double>& velocity,
+                                                FilterState* state, double time) {
+    Message given = message;
+    set_velocity(command, velocity, q, &given);
+    set_stamp(state->header.stamp, &given);
+    publish_message(safe_command_, given);
+    state->joints = command.joints;
+    state->velocity = velocity;
+    state->computation_time = time;
+    publish_message(state_, *state);
+  };
+  FilterState state;
+  const std::vector<double> velocity = filter(command, &state);
+  last_command_ = state.header.stamp;
+  give(velocity, &state, std::chrono::duration<double>(Clock::now() - begin).count());
+  halt_ = [this, give, command](const std::string& reason) {
+    FilterState none;
+    none.header.stamp = ros::Time::now();
+    none.header.frame_id = kinematics_ ? kinematics_->bodies()[0] : "";
+    none.status = FilterState::FAULT;
+    none.status_text = reason;
+    none.command.assign(command.joints.size(), kNaN);
+    if (filter_) filter_->reset();
+    give(std::vector<double>(command.joints.size(), 0.0), &none, 0.0);
+  };
+}
+
+void CommandFilter::read_robot() {
+  std::string urdf;
+  if (!nh_.getParam(description_, urdf)) {
+    robot_fault_ = "waiting for the parameter '" + nh_.resolveName(description_) + "'";
+    return;
+  }
+  try {
+    // Boxes about the shapes come with the answers: no package is looked for.
+    const auto no_packages = [](const std::string&) { return std::string(); };
+    kinematics_ = std::make_shared<const Kinematics>(
+        parse_urdf(urdf, GeometrySource::kCollision, no_packages));
+  } catch (const ModelError& error) {
+    robot_fault_ = "the URDF in '" + nh_.resolveName(description_) + "': " + error.what();
+    return;
+  }
+  robot_fault_.clear();
+  history_.emplace(kinematics_);
+  proximity_.emplace(kinematics_);
+  filter_.emplace(joint_limits(*kinematics_, config_.max_speed), std::vector<double>(),
+                  config_.rows.horizon);
+  const std::size_t columns = proximity_->joints().size();
+  command_column_.assign(columns, 0.0);
+  q_column_.assign(columns, 0.0);
+  if (!config_.joints.empty()) return;
+  for (const std::size_t j : proximity_->joints()) {
+    config_.joints.push_back(kinematics_->joints()[j].name);
+  }
+}
+
+void CommandFilter::take_joints(const sensor_msgs::JointState& message) {
+  clock_has_gone_back();
+  if (history_) history_->add(message, ros::Time::now());
+}
+
+void CommandFilter::take_answers(const ist_proximity::ProximityArray::ConstPtr& answers) {
+  clock_has_gone_back();
+  if (!proximity_) return;
+  const std::string frame = without_slash(answers->header.frame_id);
+  const std::string& root = kinematics_->bodies()[0];
+  Eigen::Isometry3d X_RF = Eigen::Isometry3d::Identity();
+  transform_fault_.clear();
+  if (frame != root) {
+    try {
+      const auto transform = tf_.lookupTransform(root, frame, answers->header.stamp).transform;
+      transform_fault_ = to_isometry(transform, &X_RF);
+    } catch (const tf2::TransformException& error) {
+      transform_fault_ = error.what();
+    }
+  }
+  if (!transform_fault_.empty()) {
+    transform_fault_ = "the distances are in '" + frame + "', which is not placed in '" + root +
+                       "': " + transform_fault_;
+  }
+  proximity_->set(answers, X_RF);
+}
+
+bool CommandFilter::clock_has_gone_back() {
+  const ros::Time now = ros::Time::now();
+  const bool has = now < last_now_;
+  last_now_ = now;
+  if (!has) return false;
+  tf_.clear();
+  if (history_) history_->clear();
+  if (proximity_) proximity_->clear();
+  if (halt_) halt_("the clock has gone back");
+  return true;
+}
+
+void CommandFilter::on_timer() {
+  if (!kinematics_) read_robot();
+  if (clock_has_gone_back() || !halt_) return;
+  const double age = seconds_between(last_command_, ros::Time::now());
+  if (age <= config_.command_timeout) return;
+  halt_(format_text("the last command came %.2f s ago; ~command_timeout is %g s", age,
+                    config_.command_timeout));
+}
+
+std::optional<std::size_t> CommandFilter::column_of(const std::string& joint) const {
+  const auto& columns = proximity_->joints();
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    if (kinematics_->joints()[columns[c]].name == joint) return c;
+  }
+  return std::nullopt;
+}
+
+double CommandFilter::position_of(const std::string& joint) const {
+  const auto index = kinematics_ ? kinematics_->find_joint(joint) : std::nullopt;
+  return index ? history_->newest(*index) : kNaN;
+}
+
+std::string CommandFilter::why_not(const JointCommand& command, const ros::Time& now) const {
+  if (!command.fault.empty()) return command.fault;
+  if (!kinematics_) return robot_fault_;
+  if (command_.getNumPublishers() > 1) {
+    return format_text("%u nodes publish on '%s'; only one may command",
+                       command_.getNumPublishers(), command_.getTopic().c_str());
+  }
+  for (const std::string& joint : command.joints) {
+    if (column_of(joint)) continue;
+    return "the robot has no joint '" + joint + "' with a position of its own";
+  }
+  std::string late = history_->late_joint(now, config_.joint_timeout);
+  if (!late.empty()) return late;
+  if (!proximity_->has_answers()) {
+    return "no distances have come on '" + answers_.getTopic() + "' yet";
+  }
+  const double age = seconds_between(proximity_->answers().header.stamp, now);
+  if (age > config_.proximity_timeout) {
+    return format_text("the distances are %.2f s old; ~proximity_timeout is %g s", age,
+                       config_.proximity_timeout);
+  }
+  if (age < -kMaxAhead) {
+    return format_text("the distances are %.2f s ahead of the clock; compare the clocks", -age);
+  }
+  return transform_fault_;
+}
+
+std::vector<double> CommandFilter::filter(const JointCommand& command, FilterState* state) {
+  const ros::Time now = ros::Time::now();
+  state->header.stamp = now;
+  state->header.frame_id = kinematics_ ? kinematics_->bodies()[0] : "";
+  state->command = command.velocity;
+  std::vector<double> velocity(command.joints.size(), 0.0);
+  state->status_text = why_not(command, now);
+  if (state->status_text.empty() && !history_->at(proximity_->answers().header.stamp, &q_then_)) {
+    state->status_text = "the joint states do not reach back to the distances' stamp";
+  }
+  if (!state->status_text.empty()) {
+    state->status = FilterState::FAULT;
+    if (filter_) filter_->reset();
+    return velocity;
+  }
+  const FilterAnswer& answer = run(command, now);
+  for (std::size_t i = 0; i < velocity.size(); ++i) {
+    velocity[i] = answer.velocity[*column_of(command.joints[i])];
+  }
+  explain(answer, state);
+  return velocity;
+}
+
+const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::Time& now) {
+  const ist_proximity::ProximityArray& answers = proximity_->answers();
+  history_->at(now, &q_now_);
+  RowConfig config = config_.rows;
+  const ros::Time& seen = answers.cloud_stamp.isZero() ? answers.header.stamp : answers.cloud_stamp;
+  config.age = std::max(0.0, seconds_between(seen, now));
+  // The robot has gone on since its joints were stated.
+  config.horizon += history_->age(now);
+  config.approach_time = std::max(config.approach_time, config.horizon);
+  rows_ = proximity_->rows(q_then_, q_now_, config);
+
+  std::vector<bool> is_commanded(command_column_.size(), false);
+  std::fill(command_column_.begin(), command_column_.end(), 0.0);
+  for (std::size_t i = 0; i < command.joints.size(); ++i) {
+    const std::size_t column = *column_of(command.joints[i]);
+    is_commanded[column] = true;
+    command_column_[column] = command.velocity[i];
+  }
+  for (std::size_t c = 0; c < q_column_.size(); ++c) q_column_[c] = q_now_[proximity_->joints()[c]];
+  hold_others(is_commanded, now);
+  return filter_->run(command_column_, q_column_, rows_, config_.time_limit);
+}
+
+/// Joints that are not commanded go on as they move now: what they do comes off the limits, and
+/// their columns are 0.
+void CommandFilter::hold_others(const std::vector<bool>& is_commanded, const ros::Time& now) {
+  const bool has_speed = history_->at(now - ros::Duration(kSpeedWindow), &q_before_);
+  for (std::size_t c = 0; c < is_commanded.size(); ++c) {
+    if (is_commanded[c]) continue;
+    const std::size_t joint = proximity_->joints()[c];
+    const double speed = has_speed ? (q_now_[joint] - q_before_[joint]) / kSpeedWindow : 0.0;
+    const auto column = static_cast<Eigen::Index>(c);
+    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.count); ++i) {
+      rows_.h[i] -= rows_.G(i, column) * speed;
+      rows_.sweep_limit[i] =
+          std::max(0.0, rows_.sweep_limit[i] - rows_.sweep(i, column) * std::abs(speed));
+      rows_.G(i, column) = rows_.sweep(i, column) = 0.0;
+    }
+  }
+}
+
+void CommandFilter::explain(const FilterAnswer& answer, FilterState* state) const {
+  state->status = static_cast<std::uint8_t>(answer.status);
+  std::vector<std::string> texts;
+  if (answer.reason != FilterReason::kNone) texts.emplace_back(sentence(answer.reason));
+  for (const std::size_t row : answer.rows) {
+    const RowOrigin& origin = rows_.origins[row];
+    const ist_proximity::LinkProximity& link = proximity_->answer(origin);
+    if (std::find(state->links.begin(), state->links.end(), link.link) != state->links.end()) {
+      continue;
+    }
+    state->links.push_back(link.link);
+    state->sources.push_back(link.source);
+    state->bounds.push_back(link.lower_bound);
+    texts.push_back(origin.state == LinkState::kUnknown
+                        ? "what is near '" + link.link + "' is not known"
+                        : format_text("'%s' is %.3f m from '%s' at least", link.link.c_str(),
+                                      link.lower_bound, link.source.c_str()));
+  }
+  for (const std::size_t column : answer.joints) {
+    const std::string& name = kinematics_->joints()[proximity_->joints()[column]].name;
+    auto& joints = state->limited_joints;
+    if (std::find(joints.begin(), joints.end(), name) != joints.end()) continue;
+    joints.push_back(name);
+    texts.push_back("joint '" + name + "' is at a limit");
+  }
+  state->status_text = join(texts, "; ");
+}
+
+}  // namespace ist

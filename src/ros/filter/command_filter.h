@@ -1,0 +1,78 @@
+#pragma once
+
+#include <geometry_msgs/TransformStamped.h>
+#include <ros/ros.h>
+#include <sensor_msgs/JointState.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/FilterState.h"
+#include "ist_proximity/ProximityArray.h"
+#include "ist_proximity/control/velocity_filter.h"
+#include "ros/filter/command_message.h"
+#include "ros/filter/filter_parameters.h"
+#include "ros/filter/joint_history.h"
+#include "ros/filter/proximity_rows.h"
+
+namespace ist {
+
+/// What a VelocityFilterServer does.
+class CommandFilter {
+ public:
+  /// @throws std::invalid_argument with a sentence for each parameter that cannot be used
+  CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh);
+  /// Gives 0 once more.
+  ~CommandFilter();
+  CommandFilter(const CommandFilter&) = delete;
+  CommandFilter& operator=(const CommandFilter&) = delete;
+
+ private:
+  template <class Message>
+  void subscribe();
+  template <class Message>
+  void receive(const Message& message);
+  void read_robot();
+  void take_answers(const ist_proximity::ProximityArray::ConstPtr& answers);
+  void take_joints(const sensor_msgs::JointState& message);
+  void on_timer();
+  bool clock_has_gone_back();
+
+  /// The given velocities, by joint of the command.
+  std::vector<double> filter(const JointCommand& command, ist_proximity::FilterState* state);
+  std::string why_not(const JointCommand& command, const ros::Time& now) const;
+  const FilterAnswer& run(const JointCommand& command, const ros::Time& now);
+  void hold_others(const std::vector<bool>& is_commanded, const ros::Time& now);
+  void explain(const FilterAnswer& answer, ist_proximity::FilterState* state) const;
+  std::optional<std::size_t> column_of(const std::string& joint) const;
+  double position_of(const std::string& joint) const;
+
+  ros::NodeHandle nh_, private_nh_;
+  FilterConfig config_;
+  std::string description_;  ///< key of the URDF's parameter
+  tf2_ros::Buffer tf_;
+  tf2_ros::TransformListener listener_;
+
+  std::shared_ptr<const Kinematics> kinematics_;  ///< null: no URDF yet
+  std::string robot_fault_;                       ///< why there is none
+  std::optional<JointHistory> history_;
+  std::optional<ProximityRows> proximity_;
+  std::optional<VelocityFilter> filter_;
+  std::string transform_fault_;  ///< why the newest answers cannot be used; empty: they can
+  ConstraintRows rows_;
+  std::vector<double> q_then_, q_now_, q_before_, q_column_, command_column_;
+
+  ros::Publisher safe_command_, state_;
+  ros::Subscriber command_, answers_, joints_;
+  ros::WallTimer timer_;
+  ros::Time last_now_, last_command_;
+  /// Gives 0 for the joints of the last command, for a reason; empty: there has been none.
+  std::function<void(const std::string&)> halt_;
+};
+
+}  // namespace ist

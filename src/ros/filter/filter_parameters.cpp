@@ -1,0 +1,45 @@
+#include "ros/filter/filter_parameters.h"
+
+#include "ros/parameters/parameter_reader.h"
+
+namespace ist {
+
+FilterConfig read_filter_config(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* errors,
+                                std::vector<std::string>* warnings) {
+  FilterConfig config;
+  RowConfig& rows = config.rows;
+  std::size_t type = 0;
+  const std::vector<std::string> types = {"trajectory_msgs/JointTrajectory",
+                                          "std_msgs/Float64MultiArray", "sensor_msgs/JointState"};
+  const Range time = Range::positive("s", 10.0);
+  const Range length = Range::non_negative("m", 10.0);
+  const Range speed = Range::non_negative("m/s", 100.0);
+  ParameterReader reader(tree);
+  for (const Parameter& parameter : std::vector<Parameter>{
+           {"command_type", choice(&type, types)},
+           {"joints", &config.joints},
+           {"robot_description", &config.robot_description},
+           {"command_timeout", &config.command_timeout, time},
+           {"proximity_timeout", &config.proximity_timeout, time},
+           {"joint_timeout", &config.joint_timeout, time},
+           {"rate", &config.rate, {"Hz", 1.0, 1000.0}},
+           {"max_speed", &config.max_speed, Range::positive("rad/s", 1e3)},
+           {"time_limit", &config.time_limit, Range::positive("s", 1.0)},
+           {"horizon", &rows.horizon, time},
+           {"margin", &rows.margin, length},
+           {"stop_distance", &rows.stop_distance, length},
+           {"approach_time", &rows.approach_time, time},
+           {"retreat_speed", &rows.retreat_speed, speed},
+           {"escape_speed", &rows.escape_speed, speed},
+           {"obstacle_speed", &rows.obstacle_speed, speed},
+       }) {
+    reader.read(parameter);
+  }
+  config.command_type = types[type];
+  *warnings = reader.unknown();
+  *errors = reader.errors();
+  for (std::string& error : config_errors(rows, "~")) errors->push_back(std::move(error));
+  return config;
+}
+
+}  // namespace ist

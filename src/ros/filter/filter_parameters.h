@@ -1,0 +1,35 @@
+#pragma once
+
+#include <xmlrpcpp/XmlRpc.h>
+
+#include <string>
+#include <vector>
+
+#include "ist_proximity/control/constraint_rows.h"
+
+namespace ist {
+
+/// What a velocity filter reads at its start; see doc/control.md.
+struct FilterConfig {
+  RowConfig rows;
+  /// "trajectory_msgs/JointTrajectory", "std_msgs/Float64MultiArray" or "sensor_msgs/JointState".
+  std::string command_type = "trajectory_msgs/JointTrajectory";
+  /// Joints of a Float64MultiArray, in order; empty: all that have a position of their own.
+  std::vector<std::string> joints;
+  std::string robot_description = "robot_description";
+  double command_timeout = 0.1;    ///< [s]
+  double proximity_timeout = 0.2;  ///< [s] oldest answer that still counts
+  double joint_timeout = 0.1;      ///< [s] oldest joint state that still counts
+  double rate = 100.0;             ///< [Hz] of zeros where commands or data are late
+  double max_speed = 10.0;         ///< [rad/s, m/s] of every joint
+  double time_limit = 0.0005;      ///< [s] of the solver
+};
+
+/// Reads what is below the private namespace.
+/// @param tree    as the parameter server holds it
+/// @param errors    one sentence for each parameter that cannot be used; empty: all can
+/// @param warnings  one sentence for each parameter that nothing reads
+FilterConfig read_filter_config(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* errors,
+                                std::vector<std::string>* warnings);
+
+}  // namespace ist

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <ros/time.h>
+#include <sensor_msgs/JointState.h>
+
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/robot/kinematics.h"
+
+namespace ist {
+
+/// Joint positions of the last second, from any number of publishers. Not thread safe.
+class JointHistory {
+ public:
+  explicit JointHistory(std::shared_ptr<const Kinematics> kinematics);
+
+  /// Takes the positions of a message that can be used: names and positions of one size, finite, a
+  /// stamp that is not 0, not older than the last one of the joint and not ahead of the clock by
+  /// more than kMaxAhead. Others stay as they are.
+  void add(const sensor_msgs::JointState& message, const ros::Time& now);
+  /// Forgets everything: the clock has gone back.
+  void clear();
+
+  /// The positions [rad, m] by joint of the kinematics at an instant, between messages by a
+  /// straight line; those of the newest message after it. A mimic joint that is not stated is NaN.
+  /// @returns false where the history does not reach back to the instant
+  bool at(const ros::Time& stamp, std::vector<double>* q) const;
+
+  /// The newest position [rad, m] of a joint; NaN: not known.
+  double newest(std::size_t joint) const { return q_[joint]; }
+
+  /// [s] since the oldest of the newest positions, of joints with a position of their own.
+  double age(const ros::Time& now) const;
+
+  /// A sentence about a joint with a position of its own that is not known, or was stated more than
+  /// `timeout` [s] ago; empty: there is none.
+  std::string late_joint(const ros::Time& now, double timeout) const;
+
+ private:
+  struct Sample {
+    ros::Time stamp;
+    std::vector<double> q;
+  };
+
+  std::shared_ptr<const Kinematics> kinematics_;
+  std::vector<double> q_;         ///< newest, by joint
+  std::vector<ros::Time> stamp_;  ///< by joint
+  std::deque<Sample> samples_;    ///< in the order of their stamps
+};
+
+}  // namespace ist

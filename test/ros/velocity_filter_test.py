@@ -1,0 +1,288 @@
+#!/usr/bin/env python3
+"""ist_proximity/VelocityFilter in the command path: a ball on two slides, a wall, and every fault."""
+
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from ist_proximity.msg import FilterState
+from proximity_testing import ProximityArray
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+SLIDES = """<robot name="slides">
+  <link name="base"/>
+  <link name="beam"/>
+  <link name="ball"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="along" type="prismatic"><parent link="base"/><child link="beam"/>
+    <axis xyz="1 0 0"/><limit lower="-5" upper="5" velocity="2" effort="1"/></joint>
+  <joint name="across" type="prismatic"><parent link="beam"/><child link="ball"/>
+    <axis xyz="0 1 0"/><limit lower="-5" upper="5" velocity="0.4" effort="1"/></joint>
+</robot>"""
+
+WALL = 1.0  # [m] along x
+RADIUS = 0.1
+STOP = 0.05
+JOINTS = ["along", "across"]
+PERIOD = 0.01
+
+
+def wall():
+    y, z = np.meshgrid(np.arange(-0.6, 0.6, 0.02), np.arange(-0.3, 0.3, 0.02))
+    return np.column_stack([np.full(y.size, WALL), y.ravel(), z.ravel()])
+
+
+class Filter:
+    """The nodelet in a process of its own."""
+
+    def __init__(self, namespace, **parameters):
+        self.name = namespace + "/filter"
+        self.states, self.given = [], []
+        for name, value in parameters.items():
+            rospy.set_param(self.name + "/" + name, value)
+        kinds = {"std_msgs/Float64MultiArray": Float64MultiArray, "sensor_msgs/JointState": JointState}
+        self.kind = kinds.get(parameters.get("command_type"), JointTrajectory)
+        self._subscribers = [
+            rospy.Subscriber(self.name + "/filter_state", FilterState, self.states.append),
+            rospy.Subscriber(self.name + "/safe_command", self.kind, self.given.append),
+        ]
+        self.publisher = rospy.Publisher(self.name + "/command", self.kind, queue_size=1)
+        self._log = tempfile.TemporaryFile()
+        self.process = subprocess.Popen(
+            [pt.find_program("ist_proximity", "velocity_filter_node")]
+            + ["__ns:=" + namespace, "__name:=filter"]
+            + ["/tf:=" + namespace + "/tf", "/tf_static:=" + namespace + "/tf_static"],
+            stdout=self._log,
+            stderr=subprocess.STDOUT,
+        )
+        pt.wait_until(lambda: self.publisher.get_num_connections() == 1, "the filter")
+
+    def stop(self):
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        self.publisher.unregister()
+        self.process.terminate()
+        return self.process.wait(pt.TIMEOUT)
+
+
+class VelocityFilterTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.filter = None
+        self.world = pt.World(self.namespace)
+        self.world.points = wall()
+        self.clouds = self.world.start_clouds()
+        self.q, self.velocity = np.zeros(2), np.zeros(2)
+        self.lock = threading.Lock()
+        self.joint_publisher = rospy.Publisher(
+            self.namespace + "/joint_states", JointState, queue_size=10
+        )
+        self.nearest = np.inf
+        self.robot = self.world.repeat(1.0 / PERIOD, self.move)
+        self.node = pt.ProximityNode(
+            self.namespace, {"pose_source": "joint_states", "self_filter": False}, SLIDES
+        )
+        self.node.wait_for_status(ProximityArray.OK)
+
+    def tearDown(self):
+        if self.filter:
+            self.filter.stop()
+        self.world.stop()
+        self.assertEqual(self.node.stop(), 0)
+
+    def move(self):
+        """One period of the robot, which follows the last velocity that it was given."""
+        with self.lock:
+            if self.filter and self.filter.given:
+                self.velocity = self.given_velocity(self.filter.given[-1])
+            self.q = self.q + PERIOD * self.velocity
+            self.nearest = min(self.nearest, WALL - RADIUS - self.q[0])
+        state = JointState(name=JOINTS, position=list(self.q))
+        state.header.stamp = rospy.Time.now()
+        self.joint_publisher.publish(state)
+
+    def given_velocity(self, message):
+        if isinstance(message, JointTrajectory):
+            return np.array(message.points[0].velocities)
+        return np.array(message.data if isinstance(message, Float64MultiArray) else message.velocity)
+
+    def command(self, *velocity):
+        if self.filter.kind is JointTrajectory:
+            point = JointTrajectoryPoint(velocities=velocity, positions=[0.0] * len(velocity))
+            point.time_from_start = rospy.Duration(PERIOD)
+            message = JointTrajectory(joint_names=JOINTS, points=[point])
+        elif self.filter.kind is JointState:
+            message = JointState(name=JOINTS, velocity=velocity)
+        else:
+            message = Float64MultiArray(data=velocity)
+        self.filter.publisher.publish(message)
+
+    def start(self, *velocity, **parameters):
+        """Starts the filter, and commands that go on until they are changed."""
+        self.filter = Filter(self.namespace, **parameters)
+        self.wanted = velocity
+        self.commands = self.world.repeat(1.0 / PERIOD, lambda: self.command(*self.wanted))
+
+    def wait_for(self, status, text=""):
+        """The first state from now on that says so."""
+        begin = len(self.filter.states)
+        found = []
+
+        def look():
+            found[:] = [
+                s for s in self.filter.states[begin:] if s.status == status and text in s.status_text
+            ]
+            return found
+
+        try:
+            pt.wait_until(look, "status %d with '%s'" % (status, text))
+        except AssertionError as error:
+            last = self.filter.states[-1] if self.filter.states else None
+            raise AssertionError("%s; the last state is\n%s" % (error, last))
+        return found[0]
+
+    def check_fault(self, text):
+        state = self.wait_for(FilterState.FAULT, text)
+        self.assertFalse(np.any(state.velocity), state)
+        self.assertEqual(state.links, [])
+        return state
+
+    def test_stops_before_a_wall_and_leaves(self):
+        self.start(0.5, 0.1)
+        limited = self.wait_for(FilterState.LIMITED)
+        self.assertEqual(list(limited.joints), JOINTS)
+        self.assertEqual(limited.links, ["ball"])
+        self.assertEqual(limited.sources, ["cloud"])
+        self.assertEqual(list(limited.command), [0.5, 0.1])
+        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
+        self.assertGreaterEqual(self.nearest, STOP - 0.005)
+        self.assertLess(WALL - RADIUS - self.q[0], STOP + 0.15)
+        # Along the wall it still goes.
+        self.assertGreater(self.velocity[1], 0.05)
+        # Away from it as commanded, at once.
+        self.wanted = (-0.3, 0.0)
+        free = self.wait_for(FilterState.FREE)
+        self.assertEqual(list(free.velocity), [-0.3, 0.0])
+        self.assertEqual(free.status_text, "")
+        # The URDF's speed limit holds, and is named.
+        self.wanted = (0.0, 1.0)
+        state = self.wait_for(FilterState.LIMITED, "across")
+        self.assertEqual(state.limited_joints, ["across"])
+        self.assertAlmostEqual(state.velocity[1], 0.4, 9)
+        # Positions follow the given velocity.
+        given = self.filter.given[-1].points[0]
+        self.assertLess(abs(given.positions[1] - self.q[1]), 0.2)
+
+    def test_started_inside_the_stop_distance(self):
+        self.q = np.array([WALL - RADIUS - 0.02, 0.0])
+        self.node.wait_for(lambda m: m.links[0].distance < 0.03, "the ball at the wall")
+        self.start(0.5, 0.0)
+        state = self.wait_for(FilterState.LIMITED)
+        self.assertLessEqual(state.velocity[0], 0.0)
+        self.wanted = (-0.2, 0.0)
+        state = self.wait_for(FilterState.FREE)
+        self.assertEqual(list(state.velocity), [-0.2, 0.0])
+        # A filter that ends gives 0 once more.
+        given = self.filter.given
+        self.assertTrue(np.any(self.given_velocity(given[-1])))
+        self.filter.process.terminate()
+        pt.wait_until(lambda: not np.any(self.given_velocity(given[-1])), "0 at the end")
+
+    def test_faults(self):
+        self.start(0.1, 0.0, command_type="std_msgs/Float64MultiArray")
+        self.wait_for(FilterState.FREE)
+        self.wanted = (np.nan, 0.0)
+        self.check_fault("velocity of joint 'along' is not a finite number")
+        self.wanted = (0.1,)
+        self.check_fault("has 1 velocities for 2 joints")
+        self.wanted = (0.1, 0.0)
+        self.wait_for(FilterState.FREE)
+
+        self.commands.paused = True
+        self.check_fault("the last command came")
+        self.commands.paused = False
+        self.wait_for(FilterState.FREE)
+
+        other = subprocess.Popen(
+            [pt.find_program("rostopic", "rostopic"), "pub", "-r", "10"]
+            + [self.filter.name + "/command", "std_msgs/Float64MultiArray", "{data: [0.1, 0.0]}"],
+            stdout=subprocess.DEVNULL,
+        )
+        self.check_fault("only one may command")
+        other.terminate()
+        other.wait()
+        self.wait_for(FilterState.FREE)
+
+        self.robot.paused = True
+        self.check_fault("~joint_timeout is 0.1 s")
+        self.robot.paused = False
+        self.wait_for(FilterState.FREE)
+
+        # A camera that is gone: what is near is not known, and the ball stands.
+        self.clouds.paused = True
+        state = self.wait_for(FilterState.LIMITED, "is not known")
+        self.assertFalse(np.any(state.velocity))
+        self.clouds.paused = False
+        self.wait_for(FilterState.FREE)
+
+        self.assertEqual(self.node.stop(), 0)
+        self.check_fault("the distances are")
+        self.assertFalse(np.any(self.given_velocity(self.filter.given[-1])))
+
+    def test_trajectories_that_cannot_be_used(self):
+        self.start(0.1, 0.0)
+        self.wait_for(FilterState.FREE)
+        self.commands.paused = True
+        for message, text in (
+            (JointTrajectory(joint_names=JOINTS), "has 0 points"),
+            (
+                JointTrajectory(
+                    joint_names=["along", "neck"],
+                    points=[JointTrajectoryPoint(velocities=[0.1, 0.1])],
+                ),
+                "no joint 'neck'",
+            ),
+            (
+                JointTrajectory(
+                    joint_names=["along", "along"],
+                    points=[JointTrajectoryPoint(velocities=[0.1, 0.1])],
+                ),
+                "twice",
+            ),
+            (
+                JointTrajectory(
+                    joint_names=JOINTS, points=[JointTrajectoryPoint(positions=[0.1, 0.1])]
+                ),
+                "time_from_start above 0",
+            ),
+        ):
+            publish = self.world.repeat(20, lambda message=message: self.filter.publisher.publish(message))
+            self.check_fault(text)
+            publish.stop()
+
+    def test_wrong_parameters_are_refused(self):
+        rospy.set_param(self.namespace + "/filter/margin", -1.0)
+        rospy.set_param(self.namespace + "/filter/command_type", "Twist")
+        process = subprocess.Popen(
+            [pt.find_program("nodelet", "nodelet"), "standalone", "ist_proximity/VelocityFilter"]
+            + ["__ns:=" + self.namespace, "__name:=filter"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        pt.wait_until(lambda: process.poll() is not None, "the nodelet to be refused")
+        text = process.stdout.read().decode()
+        self.assertIn("~margin", text)
+        self.assertIn("~command_type", text)
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("velocity_filter_test")
+    rostest.rosrun("ist_proximity", "velocity_filter_test", VelocityFilterTest, sys.argv)
