@@ -24,15 +24,6 @@ double distance_to_box(const Eigen::Vector3d& p, const Eigen::Vector3d& half) {
 
 }  // namespace
 
-void PosedObject::place(const Eigen::Isometry3d& X_FO_given) {
-  const Eigen::AlignedBox3d& box = object->shape->surface.box;
-  X_FO = nearest_rigid(X_FO_given);
-  center_F = X_FO.X * box.center();
-  half = 0.5 * box.sizes();
-  radius = half.norm();
-  extent = box.center().norm() + radius;
-}
-
 ObjectSearch::ObjectSearch(const RobotSurfaces& robot, std::size_t link)
     : model_(robot.model->links[link]), surface_(robot.surfaces[link].get()) {
   if (surface_ == nullptr) return;
@@ -67,12 +58,12 @@ double ObjectSearch::margin_of(const PosedObject& object) const {
   return question_.config.margin + question_.link_margin + object.object->margin;
 }
 
-// [m] What is left of a lower bound of the distance to an object; -inf where that is not positive.
-double ObjectSearch::less_errors(double bound, const PosedObject& object) const {
-  const double scale = center_F_.norm() + object.center_F.norm() + radius_ + object.radius;
-  bound -= kBoxRounding * scale;
-  const double drift = X_FL_.drift + object.X_FO.drift;
-  const double proven = bound - pose_error(drift, extent_ + object.extent, bound);
+// [m] What is left of a lower bound of the distance to objects; -inf where that is not positive.
+template <class Posed>
+double ObjectSearch::less_errors(double bound, const Posed& posed, double drift) const {
+  const double scale = center_F_.norm() + posed.center_F.norm() + radius_ + posed.radius;
+  bound -= 4.0 * kBoxRounding * scale;
+  const double proven = bound - pose_error(X_FL_.drift + drift, extent_ + posed.extent, bound);
   return proven > 0.0 ? proven : -kInfinity;
 }
 
@@ -83,7 +74,7 @@ double ObjectSearch::box_bound(const PosedObject& object) const {
       distance_to_box(object.X_FO.X.linear().transpose() * p_F, object.half) - radius_;
   const double to_link =
       distance_to_box(X_FL_.X.linear().transpose() * p_F, half_L_) - object.radius;
-  return less_errors(std::max(to_object, to_link), object);
+  return less_errors(std::max(to_object, to_link), object, object.X_FO.drift);
 }
 
 void ObjectSearch::begin_unknown() {
@@ -94,11 +85,11 @@ void ObjectSearch::begin_unknown() {
   near_.clear();
 }
 
-void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, const PosedObjects& objects,
+void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, PosedObjects* objects,
                          const ObjectQuestion& question, WorldQueryStatistics* statistics) {
   begin_unknown();
   if (surface_ == nullptr || !X_FL.matrix().allFinite()) return;
-  objects_ = &objects;
+  objects_ = objects;
   question_ = question;
   statistics_ = statistics;
   X_FL_ = nearest_rigid(X_FL);
@@ -115,7 +106,7 @@ void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, const PosedObjects& obje
   }
   // The nearest object of the last time is the first one, as it gives the best upper bound.
   const auto first = std::find_if(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
-    return objects.objects[c.object].object->id == nearest_id_;
+    return objects->objects()[c.object].object->id == nearest_id_;
   });
   std::swap(first != candidates_.end() ? *first
                                        : *std::max_element(candidates_.begin(), candidates_.end()),
@@ -130,34 +121,38 @@ void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, const PosedObjects& obje
 void ObjectSearch::list_objects() {
   const double range =
       question_.config.max_distance + question_.config.margin + question_.link_margin;
-  if (generation_of_list_ == objects_->generation && range <= range_of_list_) {
+  if (generation_of_list_ == objects_->generation() && range <= range_of_list_) {
     const double moved = surface_->displacement.between(X_FL_of_list_, X_FL_.X) +
-                         (objects_->path - path_of_list_) * (1.0 + 1e-12);
+                         (objects_->path() - path_of_list_) * (1.0 + 1e-12);
     if (moved < range_of_list_ + kListSlack - range) return;
   }
   ++statistics_->scans;
   list_.clear();
-  statistics_->objects_bounded += objects_->objects.size();
-  for (std::size_t i = 0; i < objects_->objects.size(); ++i) {
-    const PosedObject& object = objects_->objects[i];
-    const double reach = range + kListSlack + object.object->margin;
-    const double apart = (center_F_ - object.center_F).norm() - radius_ - object.radius;
-    if (less_errors(apart, object) >= reach || box_bound(object) >= reach) continue;
-    const std::vector<std::string>& allowed = object.object->allowed_links;
-    if (std::find(allowed.begin(), allowed.end(), model_.name) != allowed.end()) continue;
-    list_.push_back(static_cast<std::uint32_t>(i));
+  for (ObjectGroup& group : objects_->groups()) {
+    const double apart = (center_F_ - group.center_F).norm() - radius_ - group.radius;
+    const double proven = less_errors(apart, group, group.drift) - group.margin;
+    if (proven >= range + kListSlack) continue;
+    objects_->place(&group);
+    statistics_->objects_bounded += group.last - group.first;
+    for (std::size_t i = group.first; i < group.last; ++i) {
+      const PosedObject& object = objects_->objects()[i];
+      if (box_bound(object) - object.object->margin >= range + kListSlack) continue;
+      const std::vector<std::string>& allowed = object.object->allowed_links;
+      if (std::find(allowed.begin(), allowed.end(), model_.name) != allowed.end()) continue;
+      list_.push_back(static_cast<std::uint32_t>(i));
+    }
   }
   X_FL_of_list_ = X_FL_.X;
-  path_of_list_ = objects_->path;
+  path_of_list_ = objects_->path();
   range_of_list_ = range;
-  generation_of_list_ = objects_->generation;
+  generation_of_list_ = objects_->generation();
 }
 
 void ObjectSearch::collect_candidates() {
   candidates_.clear();
   statistics_->objects_bounded += list_.size();
   for (const std::uint32_t i : list_) {
-    const PosedObject& object = objects_->objects[i];
+    const PosedObject& object = objects_->objects()[i];
     const double bound = box_bound(object) - margin_of(object);
     if (bound < question_.config.max_distance) candidates_.push_back({bound, i});
   }
@@ -190,7 +185,7 @@ ObjectSearch::Slot* ObjectSearch::slot_of(const PosedObject& object) {
 }
 
 void ObjectSearch::activate(const Candidate& candidate) {
-  const PosedObject& object = objects_->objects[candidate.object];
+  const PosedObject& object = objects_->objects()[candidate.object];
   const double margin = margin_of(object);
   // An object that is farther than the nearest one need not be measured.
   const double range = std::max({distance_, question_.influence_distance, kTouch});
@@ -242,7 +237,7 @@ void ObjectSearch::take_result() {
 
 void ObjectSearch::take_distance(const PairProximity& found) {
   if (found.state != LinkState::kNear && found.state != LinkState::kContact) return;
-  const PosedObject& object = objects_->objects[current_candidate_.object];
+  const PosedObject& object = objects_->objects()[current_candidate_.object];
   const LinkProximity answer = answer_of(found, object);
   if (near_.size() < near_.capacity()) near_.push_back({object.world, object.index, answer});
   if (!(found.distance < distance_)) return;

@@ -7,33 +7,13 @@
 #include <optional>
 #include <vector>
 
-#include "internal/geometry/relative_pose.h"
-#include "ist_proximity/proximity/known_world.h"
 #include "ist_proximity/proximity/world_query.h"
 #include "proximity/link_pair_query.h"
+#include "proximity/posed_objects.h"
 #include "proximity/robot_surfaces.h"
 #include "proximity/world_shape.h"
 
 namespace ist {
-
-/// An object at its pose.
-struct PosedObject {
-  const KnownWorld::Object* object = nullptr;  ///< owned by its world
-  std::uint32_t world = 0, index = 0;          ///< its world, and its place there
-  RigidPose X_FO;
-  Eigen::Vector3d center_F, half;  ///< [m] of its box, whose axes are those of O
-  double radius = 0.0;             ///< [m] of the sphere about its box
-  double extent = 0.0;             ///< [m] no point of it is farther from O's origin
-
-  void place(const Eigen::Isometry3d& X_FO_given);
-};
-
-/// All objects of a query.
-struct PosedObjects {
-  std::vector<PosedObject> objects;
-  double path = 0.0;             ///< [m] no object has moved farther, all motions added
-  std::uint64_t generation = 0;  ///< another one whenever the objects are others
-};
 
 /// The question to one link.
 struct ObjectQuestion {
@@ -56,9 +36,9 @@ class ObjectSearch {
   void prepare(std::size_t objects, const WorldShape* open);
 
   /// Begins a query: bounds by boxes, and the distance to one object.
-  /// @param objects  outlive the query
-  void begin(const Eigen::Isometry3d& X_FL, const PosedObjects& objects,
-             const ObjectQuestion& question, WorldQueryStatistics* statistics);
+  /// @param objects  outlive the query; those are placed that are near
+  void begin(const Eigen::Isometry3d& X_FL, PosedObjects* objects, const ObjectQuestion& question,
+             WorldQueryStatistics* statistics);
   /// The link is UNKNOWN.
   void begin_unknown();
   /// Goes on until the tolerance is reached.
@@ -84,7 +64,9 @@ class ObjectSearch {
     std::uint64_t used = 0;  ///< number of the last query
   };
 
-  double less_errors(double bound, const PosedObject& object) const;
+  /// @tparam Posed  PosedObject or ObjectGroup
+  template <class Posed>
+  double less_errors(double bound, const Posed& posed, double drift) const;
   double box_bound(const PosedObject& object) const;
   double margin_of(const PosedObject& object) const;
   double stop_bound() const;
@@ -113,7 +95,7 @@ class ObjectSearch {
   std::uint64_t nearest_id_ = 0;  // of the last query
 
   // One query.
-  const PosedObjects* objects_ = nullptr;
+  PosedObjects* objects_ = nullptr;
   ObjectQuestion question_;
   WorldQueryStatistics* statistics_ = nullptr;
   RigidPose X_FL_;

@@ -1,12 +1,10 @@
 #include "ist_proximity/proximity/world_query.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "internal/geometry/cancelled.h"
-#include "internal/geometry/numbers.h"
 #include "internal/proximity/deadline.h"
 #include "proximity/object_search.h"
 
@@ -15,8 +13,6 @@ namespace {
 
 // Pairs of boxes that a link looks at before the clock is read: some tens of microseconds.
 constexpr int kObjectSlice = 256;
-// [m] The path is counted anew after this length, so that it keeps its digits.
-constexpr double kLongestPath = 1e4;
 
 bool is_placed(const PosedWorld& posed) {
   if (!posed.world) return true;
@@ -51,10 +47,7 @@ struct WorldQuery::Impl {
     bool operator<(const Waiting& other) const { return bound > other.bound; }  // least on top
   };
 
-  bool take_worlds(Span<const PosedWorld* const> given);
-  void list_objects(Span<const PosedWorld* const> given);
   void prepare_searches();
-  void move_objects(Span<const PosedWorld* const> given);
   void finish_by(Deadline* deadline);
   void count_unfinished(const LinkProximity& result);
 
@@ -63,9 +56,7 @@ struct WorldQuery::Impl {
   std::vector<double> link_margins;
   double influence_distance = 0.0;
   WorldQueryStatistics statistics;
-  std::vector<PosedWorld> worlds;  // of the last run
   PosedObjects objects;
-  std::vector<bool> has_moved;         // scratch: by frame of a world
   std::vector<ObjectSearch> searches;  // by link
   std::vector<Waiting> queue;          // a heap
 };
@@ -101,83 +92,14 @@ bool WorldQuery::is_finished(std::size_t link) const {
   return link < impl_->searches.size() && impl_->searches[link].is_finished();
 }
 
-void WorldQuery::Impl::list_objects(Span<const PosedWorld* const> given) {
-  objects.objects.clear();
-  ++objects.generation;
-  objects.path = 0.0;
-  worlds.resize(given.size());
-  for (std::size_t w = 0; w < given.size(); ++w) {
-    worlds[w] = *given[w];
-    if (!worlds[w].world) continue;
-    has_moved.reserve(worlds[w].X_FB.size());
-    for (const KnownWorld::Object& object : worlds[w].world->objects()) {
-      objects.objects.emplace_back();
-      PosedObject& posed = objects.objects.back();
-      posed.object = &object;
-      posed.world = static_cast<std::uint32_t>(w);
-      posed.index = static_cast<std::uint32_t>(&object - worlds[w].world->objects().data());
-      posed.place(worlds[w].X_FB[object.frame] * object.X_BO);
-    }
-  }
-  statistics.objects_placed = objects.objects.size();
-}
-
 // Memory for the searches of all links.
 void WorldQuery::Impl::prepare_searches() {
   const WorldShape* open = nullptr;
-  for (const PosedObject& posed : objects.objects) {
+  for (const PosedObject& posed : objects.objects()) {
     const WorldShape& shape = *posed.object->shape;
     if (!shape.surface.opening_cells.empty()) open = &shape;
   }
-  for (ObjectSearch& search : searches) search.prepare(objects.objects.size(), open);
-}
-
-// Places the objects of frames that have moved.
-void WorldQuery::Impl::move_objects(Span<const PosedWorld* const> given) {
-  double farthest = 0.0;
-  auto next = objects.objects.begin();
-  for (std::size_t w = 0; w < given.size(); ++w) {
-    if (!worlds[w].world) continue;  // its poses are anything
-    has_moved.assign(worlds[w].X_FB.size(), false);
-    for (std::size_t frame = 0; frame < has_moved.size(); ++frame) {
-      has_moved[frame] = given[w]->X_FB[frame].matrix() != worlds[w].X_FB[frame].matrix();
-      if (has_moved[frame]) worlds[w].X_FB[frame] = given[w]->X_FB[frame];
-    }
-    const auto end = next + static_cast<std::ptrdiff_t>(worlds[w].world->objects().size());
-    for (; next != end; ++next) {
-      const KnownWorld::Object& object = *next->object;
-      if (!has_moved[object.frame]) continue;
-      const RigidPose before = next->X_FO;
-      next->place(worlds[w].X_FB[object.frame] * object.X_BO);
-      const double moved = object.shape->surface.displacement.between(before.X, next->X_FO.X) +
-                           (before.drift + next->X_FO.drift) * next->extent;
-      if (!(moved <= farthest)) farthest = std::isnan(moved) ? kInfinity : moved;
-      ++statistics.objects_placed;
-    }
-  }
-  objects.path += farthest;
-  if (!(objects.path < kLongestPath)) {  // the lists are made anew
-    objects.path = 0.0;
-    ++objects.generation;
-  }
-}
-
-// @returns false where a world is not placed
-bool WorldQuery::Impl::take_worlds(Span<const PosedWorld* const> given) {
-  if (!std::all_of(given.begin(), given.end(),
-                   [](const PosedWorld* world) { return is_placed(*world); })) {
-    return false;
-  }
-  const bool are_same = std::equal(
-      given.begin(), given.end(), worlds.begin(), worlds.end(),
-      [](const PosedWorld* one, const PosedWorld& other) { return one->world == other.world; });
-  if (are_same) {
-    move_objects(given);
-  } else {
-    list_objects(given);
-    prepare_searches();
-  }
-  return true;
+  for (ObjectSearch& search : searches) search.prepare(objects.objects().size(), open);
 }
 
 // The link with the least bound goes on, until all are finished or the time is over.
@@ -209,7 +131,12 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
   results->resize(count);
   for (LinkProximity& result : *results) result.reset();
   for (ObjectSearch& search : impl.searches) search.begin_unknown();
-  if (X_FL.size() != count || known.size() != count || !impl.take_worlds(worlds)) return true;
+  if (X_FL.size() != count || known.size() != count ||
+      !std::all_of(worlds.begin(), worlds.end(),
+                   [](const PosedWorld* world) { return is_placed(*world); })) {
+    return true;
+  }
+  if (impl.objects.take(worlds)) impl.prepare_searches();
   const bool is_limited = end != TimePoint::max();
   Deadline deadline(end);
   impl.queue.clear();
@@ -219,7 +146,7 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
                                   i < impl.link_margins.size() ? impl.link_margins[i] : 0.0,
                                   impl.influence_distance};
     ObjectSearch& search = impl.searches[i];
-    search.begin(X_FL[i], impl.objects, question, &impl.statistics);
+    search.begin(X_FL[i], &impl.objects, question, &impl.statistics);
     if (search.is_finished()) continue;
     if (is_limited) {
       impl.queue.push_back({search.lower_bound(), i});
@@ -232,6 +159,7 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
     impl.searches[i].report(&(*results)[i]);
     if (!impl.searches[i].is_finished()) impl.count_unfinished((*results)[i]);
   }
+  impl.statistics.objects_placed = impl.objects.placements();
   return impl.statistics.unfinished == 0;
 }
 
