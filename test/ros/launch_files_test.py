@@ -149,7 +149,7 @@ class LaunchFilesTest(unittest.TestCase):
         self.assertNotIn("planning_scene_bridge", [n.type for n in loaded("cell.launch").nodes])
         config = loaded("cell.launch", "planning_scene:=/scenes", "fixed_frame:=world", "name:=near")
         (bridge,) = [n for n in config.nodes if n.type == "planning_scene_bridge"]
-        self.assertIn(("planning_scene", "/scenes"), bridge.remap_args)
+        self.assertIn(["planning_scene", "/scenes"], [list(pair) for pair in bridge.remap_args])
         self.assertEqual(config.params["/near_planning_scene_bridge/fixed_frame"].value, "world")
         self.assertEqual(config.params["/near/sources/cell/topic"].value, "world_objects")
         self.assertTrue(pt.find_program("ist_proximity", bridge.type))
