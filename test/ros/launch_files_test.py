@@ -8,7 +8,6 @@ import sys
 import unittest
 from xml.etree import ElementTree
 
-import numpy as np
 import proximity_testing as pt
 import roslaunch.config
 import roslaunch.xmlloader
@@ -127,15 +126,6 @@ class LaunchFilesTest(unittest.TestCase):
         self.check(robot, 0.1, "cloud")
         robot.stop()
 
-    def test_filter_of_pcl(self):
-        """What a nodelet of pcl_ros drops on the way, here below z = 0.68, is no obstacle."""
-        q = {"turn": 0.5, "slide": 0.2}
-        kept, dropped = beside_the_ball(q, 0.1), beside_the_ball(q, 0.05)
-        self.assertLess(dropped[0, 2], 0.68)
-        robot = Robot("/filtered", q, {"camera/points": np.vstack([kept, dropped])})
-        self.check(robot, 0.1, "cloud")
-        robot.stop()
-
     def test_cell(self):
         """The ball is above the table of config/cell.yaml, the box beyond its back wall; no camera."""
         robot = Robot("/in_cell", {"turn": 0.0, "slide": 0.2}, {})
@@ -159,6 +149,8 @@ class LaunchFilesTest(unittest.TestCase):
         common = launch_arguments("proximity.launch") - {"cloud"}
         self.assertGreater(len(common), 12)
         for name in launch_files():
+            if name == "velocity_filter.launch":
+                continue  # it starts no proximity node
             with self.subTest(name):
                 self.assertLessEqual(common, launch_arguments(name))
                 given = ["fixed_frame:=world", "pose_source:=joint_states", "max_distance:=0.7"]
