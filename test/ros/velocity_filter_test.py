@@ -232,8 +232,20 @@ class VelocityFilterTest(unittest.TestCase):
         self.wait_for(FilterState.FREE)
 
         self.assertEqual(self.node.stop(), 0)
-        self.check_fault("the distances are")
+        self.check_fault("s old; ~proximity_timeout is 0.2 s")
         self.assertFalse(np.any(self.given_velocity(self.filter.given[-1])))
+
+        # Before a robot's URDF is known, a node watches no link.
+        answers = rospy.Publisher(self.namespace + "/proximity/proximity", ProximityArray, queue_size=1)
+
+        def answer_nothing():
+            message = ProximityArray(status=ProximityArray.LOADING, status_text="no URDF yet")
+            message.header.stamp = rospy.Time.now()
+            message.header.frame_id = "base"
+            answers.publish(message)
+
+        self.world.repeat(50, answer_nothing)
+        self.check_fault("of no link: no URDF yet")
 
     def test_trajectories_that_cannot_be_used(self):
         self.start(0.1, 0.0)

@@ -221,7 +221,9 @@ std::string CommandFilter::why_not(const JointCommand& command, const ros::Time&
   if (!proximity_->has_answers()) {
     return "no distances have come on '" + answers_.getTopic() + "' yet";
   }
-  const double age = seconds_between(proximity_->answers().header.stamp, now);
+  const ist_proximity::ProximityArray& answers = proximity_->answers();
+  if (answers.links.empty()) return "the distances are of no link: " + answers.status_text;
+  const double age = seconds_between(answers.header.stamp, now);
   if (age > config_.proximity_timeout) {
     return format_text("the distances are %.2f s old; ~proximity_timeout is %g s", age,
                        config_.proximity_timeout);

@@ -23,7 +23,12 @@ bool is_same(const LinkBox& a, const LinkBox& b) {
 }  // namespace
 
 ProximityRows::ProximityRows(std::shared_ptr<const Kinematics> kinematics)
-    : kinematics_(std::move(kinematics)) {
+    : kinematics_(std::move(kinematics)), turns_(kinematics_->joints().size(), 0.0) {
+  for (const Kinematics::Joint& joint : kinematics_->joints()) {
+    if (joint.type != JointType::kFixed && !joint.has_unstated_pose()) {
+      turns_[joint.source] += std::abs(joint.multiplier);
+    }
+  }
   build({});
 }
 
@@ -72,7 +77,7 @@ double ProximityRows::motion(std::size_t row, const std::vector<double>& q_then,
         builder_->rows().sweep(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(c));
     if (!(sweep > 0.0)) continue;
     moved += sweep * step;
-    turned += step;
+    turned += turns_[joints[c]] * step;
   }
   return turned < 0.5 ? moved / (1.0 - turned) : kInfinity;  // also where a position is not known
 }

@@ -16,7 +16,8 @@ namespace ist {
 ///
 /// What the robot has moved since the answers' stamp comes off their bounds: with joints moved by
 /// dq, points of a link have moved by at most M = S / (1 - s), S = sum sweep_k |dq_k| and
-/// s = sum |dq_k|, because levers grow by at most M.
+/// s = sum t_k |dq_k|, because levers grow by at most M; t_k is 1, and more with joints that mimic
+/// k.
 class ProximityRows {
  public:
   explicit ProximityRows(std::shared_ptr<const Kinematics> kinematics);
@@ -53,6 +54,7 @@ class ProximityRows {
   Eigen::Isometry3d X_RF_ = Eigen::Isometry3d::Identity();
   std::optional<ConstraintRowBuilder> builder_;
   std::vector<LinkBox> boxes_;
+  std::vector<double> turns_;  ///< by joint of the kinematics: t_k
   std::vector<LinkProximity> results_;
   std::vector<double> obstacle_speeds_;
   JointPoses joint_poses_;
