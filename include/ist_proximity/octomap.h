@@ -88,7 +88,7 @@ Obstacles to_obstacles(const octomap::OccupancyOcTreeBase<Node>& tree,
   return Obstacles::from_boxes(occupied_boxes(tree, selection), X_FM);
 }
 
-/// What a memory knows, free and occupied, as octomap holds it.
+/// Makes a tree of what a memory knows, free and occupied.
 /// @throws std::runtime_error when liboctomap does not take the tree
 inline std::unique_ptr<octomap::OcTree> to_octree(const MemoryMap& memory) {
   auto tree = std::make_unique<octomap::OcTree>(memory.config().resolution);

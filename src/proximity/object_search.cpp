@@ -12,7 +12,7 @@ namespace {
 
 // [m] Link and objects may move by this much until the list of objects is made anew.
 constexpr double kListSlack = 0.1;
-// Of all coordinates involved: the rounding of a box's distance.
+// The rounding of a box's distance, as a share of all coordinates involved.
 constexpr double kBoxRounding = 1e-14;
 // [m] In contact, other objects matter that are in contact too.
 constexpr double kTouch = 1e-6;

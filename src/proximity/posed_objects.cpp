@@ -13,7 +13,7 @@ namespace {
 constexpr double kLongestPath = 1e4;
 // Objects in a group, at most.
 constexpr std::size_t kGroupSize = 2 * kBoxWidth;
-// Of all coordinates involved: the rounding of a sphere about boxes.
+// The rounding of a sphere about boxes, as a share of all coordinates involved.
 constexpr double kRounding = 1e-14;
 
 // [m] The sphere about an object's box, in the frame that the object stands in.

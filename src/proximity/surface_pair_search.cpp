@@ -81,7 +81,7 @@ double SurfacePairSearch::tolerance_at(double distance) const {
   const double resolved = 1e-12 * distance + 4.0 * exact_rounding_;
   const double tolerance =
       std::max({goal_.tolerance, goal_.relative_tolerance * distance, resolved});
-  // From then on bounds that are as near as the rounding of boxes count as equal.
+  // After many pairs, bounds that are as near as the rounding of boxes count as equal.
   return looked_at_ > kManyPairs ? std::max(tolerance, 2.0 * rounding_) : tolerance;
 }
 
@@ -150,7 +150,7 @@ double SurfacePairSearch::bound_by_hulls(const Pair& pair) {
   return std::max(hulls.lower_bound - exact_rounding_, 0.0);
 }
 
-// What is proven from here on is proven at this pose.
+// Begins a search, whose bounds are proven at this pose.
 void SurfacePairSearch::begin_search() {
   // A front that costs more than to start anew has become too fine for what is near now.
   if (is_new_) cost_of_new_ = looked_at_;

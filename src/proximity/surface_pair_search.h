@@ -153,8 +153,8 @@ class SurfacePairSearch {
   const SurfaceBvh &a_, &b_;
   const std::size_t capacity_;
   std::vector<Entry> front_;  // a heap
-  // Of the front, but not to be looked at again at this pose: parts that were measured, and what
-  // the front has no place for.
+  // Parts of the front that are not to be looked at again at this pose: they were measured, or the
+  // front has no place for them.
   std::vector<Entry> aside_;
   double least_aside_ = std::numeric_limits<double>::infinity();  // [m] key
   bool is_complete_ = true;  // false: there was no place here either, so the front is to be dropped
