@@ -166,16 +166,6 @@ TEST(Facade, DamagedBytesAreRefused) {
   }
 }
 
-template <class Call>
-std::string argument_error(const Call& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "(no error)";
-}
-
 // A finger that follows another one, along x; the other one moves along y, out of the way.
 TEST(Facade, AStatedMimicJointCounts) {
   const std::string ball = "<collision><geometry><sphere radius='0.05'/></geometry></collision>";
@@ -219,28 +209,30 @@ TEST(Facade, WrongArgumentsAreNamed) {
   const Obstacles obstacles(std::vector<Eigen::Vector3f>{{0.5F, 0.0F, 0.5F}});
   const std::vector<double> q(demo().joints().size(), 0.0), short_q(2, 0.0);
   using test::expect_says;
-  expect_says(argument_error([&] { demo().distances(short_q, obstacles); }),
+  expect_says(test::argument_error([&] { demo().distances(short_q, obstacles); }),
               "2 positions were given");
-  expect_says(argument_error([&] { demo().distances_batch(short_q, obstacles); }),
+  expect_says(test::argument_error([&] { demo().distances_batch(short_q, obstacles); }),
               "2 numbers were given");
-  expect_says(argument_error([&] {
+  expect_says(test::argument_error([&] {
                 demo().configuration({{"no_joint", 0.0}});
               }),
               "no joint 'no_joint'");
   QueryConfig config;
   config.tolerance = -1.0;
-  expect_says(argument_error([&] { demo().distances(q, obstacles, config); }), "tolerance");
+  expect_says(test::argument_error([&] { demo().distances(q, obstacles, config); }), "tolerance");
   config = QueryConfig();
   config.max_distance = kNaN;
-  expect_says(argument_error([&] { demo().distances(q, obstacles, config); }), "max_distance");
+  expect_says(test::argument_error([&] { demo().distances(q, obstacles, config); }),
+              "max_distance");
   Eigen::Isometry3d sheared = Eigen::Isometry3d::Identity();
   sheared(0, 1) = 0.1;
   const std::vector<Eigen::Isometry3d> X_FL(demo().links().size(), sheared);
-  expect_says(argument_error([&] { demo().distances_at(X_FL, obstacles); }), "not rigid");
+  expect_says(test::argument_error([&] { demo().distances_at(X_FL, obstacles); }), "not rigid");
   ObstaclesConfig far;
   far.min_range = 2.0;
   far.max_range = 1.0;
-  EXPECT_NE(argument_error([&] { Obstacles(std::vector<Eigen::Vector3f>(1), far); }), "(no error)");
+  EXPECT_NE(test::argument_error([&] { Obstacles(std::vector<Eigen::Vector3f>(1), far); }),
+            "(no error)");
   expect_says(test::error_of([] { Robot("/no/such/robot.urdf"); }), "/no/such/robot.urdf");
   expect_says(test::error_of([] { Robot("<robot name='r'><link name='l'/></robot>"); }),
               "no usable link");

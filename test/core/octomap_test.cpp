@@ -7,7 +7,6 @@
 #include <octomap/OcTree.h>
 
 #include <algorithm>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <string>
@@ -59,15 +58,6 @@ double distance(const Obstacles& obstacles) {
   return ball.nearest({}, obstacles, exact).nearest.distance;
 }
 
-std::string error_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "(no error)";
-}
-
 TEST(Octomap, ATreeOfColoursIsRead) {
   const auto plain = random_tree<octomap::OcTree>(0.05, 400);
   const auto coloured = random_tree<octomap::ColorOcTree>(0.05, 400);
@@ -107,7 +97,7 @@ TEST(Octomap, AMapIsPlacedByItsPose) {
   X_FM.translation() << 1.8, 0.15, 0.05;  // its lower corner; the ball ends at x = 1.55
   EXPECT_NEAR(distance(to_obstacles(tree, X_FM)), 0.25, 1e-6);
   X_FM.linear() *= 2.0;
-  test::expect_says(error_of([&] { to_obstacles(tree, X_FM); }), "X_FM");
+  test::expect_says(test::argument_error([&] { to_obstacles(tree, X_FM); }), "X_FM");
 }
 
 TEST(Octomap, WhatCannotBeUsedIsSaid) {
@@ -117,16 +107,19 @@ TEST(Octomap, WhatCannotBeUsedIsSaid) {
   const auto tree = random_tree<octomap::OcTree>(0.05, 400);
   OctomapSelection selection;
   selection.limits.max_leaves = 100;
-  test::expect_says(error_of([&] { to_obstacles(tree, Eigen::Isometry3d::Identity(), selection); }),
-                    "100 (max_leaves)");
+  test::expect_says(
+      test::argument_error([&] { to_obstacles(tree, Eigen::Isometry3d::Identity(), selection); }),
+      "100 (max_leaves)");
   selection = {};
   selection.limits.max_position = 0.5;
-  test::expect_says(error_of([&] { occupied_boxes(tree, selection); }), "(max_position)");
+  test::expect_says(test::argument_error([&] { occupied_boxes(tree, selection); }),
+                    "(max_position)");
   selection = {};
   selection.max_depth = 17;
-  test::expect_says(error_of([&] { occupied_boxes(tree, selection); }), "max_depth is 17");
+  test::expect_says(test::argument_error([&] { occupied_boxes(tree, selection); }),
+                    "max_depth is 17");
   const Eigen::AlignedBox3d none;
-  test::expect_says(error_of([&] { Obstacles::from_boxes({none}); }), "it is empty");
+  test::expect_says(test::argument_error([&] { Obstacles::from_boxes({none}); }), "it is empty");
 }
 
 }  // namespace

@@ -85,15 +85,6 @@ struct PointInDouble {
   double intensity, z, x, y;
 };
 
-std::string error_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "(no error)";
-}
-
 // The same points give the same distances, to the bit, whatever they come in.
 TEST(Pcl, EveryKindOfCloudGivesTheSameDistances) {
   const pcl::PointCloud<pcl::PointXYZI> cloud = random_cloud();
@@ -196,18 +187,18 @@ TEST(Pcl, AViewCopiesAndAllocatesNothing) {
 TEST(Pcl, ACloudThatContradictsItselfIsRefused) {
   pcl::PointCloud<pcl::PointXYZ> cloud(3, 2);
   cloud.points.pop_back();
-  test::expect_says(error_of([&] { view(cloud); }), "5 points has width 3 * height 2");
+  test::expect_says(test::argument_error([&] { view(cloud); }), "5 points has width 3 * height 2");
   cloud = pcl::PointCloud<pcl::PointXYZ>(3, 2);
   cloud.sensor_orientation_ = Eigen::Quaternionf(0, 0, 0, 0);
-  test::expect_says(error_of([&] { view(cloud); }), "sensor_orientation_");
+  test::expect_says(test::argument_error([&] { view(cloud); }), "sensor_orientation_");
   cloud.sensor_orientation_.setIdentity();
   cloud.sensor_origin_.x() = kNaN;
-  test::expect_says(error_of([&] { view(cloud); }), "sensor_origin_");
+  test::expect_says(test::argument_error([&] { view(cloud); }), "sensor_origin_");
   const pcl::PointCloud<pcl::PointXYZ>::ConstPtr none;
-  test::expect_says(error_of([&] { view(none); }), "null");
+  test::expect_says(test::argument_error([&] { view(none); }), "null");
   for (auto& p : cloud) p.x = kNaN;
   cloud.sensor_origin_.setZero();
-  test::expect_says(error_of([&] { to_obstacles(cloud); }), "none was measured");
+  test::expect_says(test::argument_error([&] { to_obstacles(cloud); }), "none was measured");
   EXPECT_EQ(to_obstacles(pcl::PointCloud<pcl::PointXYZ>()).size(), 0U);
 
   pcl::PCLPointCloud2 whole;
@@ -215,7 +206,7 @@ TEST(Pcl, ACloudThatContradictsItselfIsRefused) {
   const auto spoiled = [&](const std::function<void(pcl::PCLPointCloud2*)>& spoil) {
     pcl::PCLPointCloud2 blob = whole;
     spoil(&blob);
-    return error_of([&] { view(blob); });
+    return test::argument_error([&] { view(blob); });
   };
   using Blob = pcl::PCLPointCloud2;
   test::expect_says(spoiled([](Blob* b) { b->data.pop_back(); }), "data holds");

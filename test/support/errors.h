@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
 #include <string>
 
 #include "ist_proximity/geometry/error.h"
@@ -19,6 +20,17 @@ std::string error_of(const Call& call) {
   try {
     call();
   } catch (const ModelError& error) {
+    return error.what();
+  }
+  return "(no error)";
+}
+
+/// The message of the std::invalid_argument that a call throws.
+template <class Call>
+std::string argument_error(const Call& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
     return error.what();
   }
   return "(no error)";

@@ -20,7 +20,7 @@ namespace ist {
 void fill_status(const StatusInput& input, const Status& status,
                  ist_proximity::ProximityArray* message);
 
-/// What is found of a model whose robot is known, or not yet.
+/// Lists what is found of a model whose robot is known, or not yet.
 Findings model_findings(const ModelState& model);
 
 /// Fills the whole message while there is no model: MODEL_ERROR or LOADING, and every

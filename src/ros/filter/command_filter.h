@@ -22,7 +22,7 @@
 
 namespace ist {
 
-/// What a VelocityFilterServer does.
+/// Does the work of a VelocityFilterServer.
 class CommandFilter {
  public:
   /// @throws std::invalid_argument with a sentence for each parameter that cannot be used

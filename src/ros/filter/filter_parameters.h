@@ -9,7 +9,7 @@
 
 namespace ist {
 
-/// What a velocity filter reads at its start; see doc/control.md.
+/// The parameters of a velocity filter, read at its start (doc/control.md).
 struct FilterConfig {
   RowConfig rows;
   /// "trajectory_msgs/JointTrajectory", "std_msgs/Float64MultiArray" or "sensor_msgs/JointState".

@@ -14,7 +14,7 @@ namespace ist {
 
 /// Makes ConstraintRows of the node's answers, for where the robot is by now. Not thread safe.
 ///
-/// What the robot has moved since the answers' stamp comes off their bounds: with joints moved by
+/// The robot's motion since the answers' stamp comes off their bounds: with joints moved by
 /// dq, points of a link have moved by at most M = S / (1 - s), S = sum sweep_k |dq_k| and
 /// s = sum t_k |dq_k|, because levers grow by at most M; t_k is 1, and more with joints that mimic
 /// k.

@@ -38,7 +38,7 @@ struct DeadlineCost {
   void add(const DeadlineCost& other);
 };
 
-/// What kind of thing is not as it should be. The first kinds decide over the later ones.
+/// The kinds of things that are not as they should be. The first kinds decide over the later ones.
 enum class Rank : std::uint8_t {
   kModel,     ///< there is no model, or a link of it cannot be used
   kLoading,   ///< the model is being made
