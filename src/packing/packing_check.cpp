@@ -199,4 +199,24 @@ std::string packing_fault(const Shape& shape, const PackingConfig& config, const
   return watch.stopped() ? "its check was cancelled" : fault;
 }
 
+double tight_interior_gap(const Shape& shape, const PackingConfig& config, const Packing& packing) {
+  // Smaller gaps take many more cells to prove.
+  constexpr int kHalvings = 4;
+  double gap = packing.certificate.interior_gap;
+  if (std::holds_alternative<Sphere>(shape)) return gap;
+  const PackedMesh packed = packed_mesh(shape, config);
+  const TriangleBvh bvh(packed.mesh);
+  PackingWatch watch({});
+  for (int i = 0; i < kHalvings; ++i) {
+    const double half = 0.5 * gap;
+    if (half <= packed.deviation ||
+        !is_interior_covered(packed.mesh, bvh, packing, packed.deviation, half - packed.deviation,
+                             &watch)) {
+      break;
+    }
+    gap = half;
+  }
+  return gap;
+}
+
 }  // namespace ist

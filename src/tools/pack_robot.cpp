@@ -11,20 +11,24 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "internal/packing/packing_cache.h"
 #include "internal/robot/mesh_size.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "pack_robot/containing_spheres.h"
 #include "pack_robot/input.h"
 #include "pack_robot/output.h"
 #include "pack_robot/picture.h"
+#include "pack_robot/sphere_files.h"
 
 namespace {
 
 struct Options {
   std::string input, csv, ply, picture, order = "medial";
+  std::vector<std::pair<std::string, std::string>> exports;  // format, file
   std::vector<std::string> package_dirs;
   std::vector<double> max_errors = {ist::PackingConfig().max_error};
   bool visual = false, no_cache = false;
@@ -64,6 +68,34 @@ void declare(CLI::App* app, Options* options) {
                   "writes all spheres of the last error to this file, links at joint positions 0: "
                   "x y z radius cover_radius link");
   app->add_option("--picture", options->picture, "draws the packings into this PNG file");
+  app->add_option(
+         "--export", options->exports,
+         "FORMAT FILE: writes spheres that contain each link, of the last error, as urdf "
+         "(collision geometry), yaml or curobo (robot file), and prints how well they fit; "
+         "may be repeated")
+      ->check(CLI::IsMember({"urdf", "yaml", "curobo"}).application_index(0));
+}
+
+// Writes the spheres of a model in every format that is asked for.
+void export_spheres(const ist::tools::Input& input, const ist::RobotModel& model,
+                    const ist::PackingConfig& config,
+                    const std::vector<std::pair<std::string, std::string>>& exports) {
+  ist::tools::LinkSpheres spheres;
+  std::vector<ist::tools::SphereFit> fits;
+  for (const ist::LinkDescription& link : input.robot.links) {
+    for (const ist::LinkModel& packed : model.links) {
+      if (packed.name != link.name || !packed.usable()) continue;
+      spheres[link.name] = ist::tools::containing_spheres(packed, link.geometry, config);
+      fits.push_back(ist::tools::measure_fit(packed, link.geometry, spheres[link.name]));
+    }
+  }
+  ist::tools::print_fits(fits);
+  for (const auto& [format, file] : exports) {
+    ist::tools::write_file(file, format == "urdf" ? ist::tools::spheres_as_urdf(input, spheres)
+                                 : format == "yaml"
+                                     ? ist::tools::spheres_as_yaml(spheres)
+                                     : ist::tools::spheres_as_curobo(input, spheres));
+  }
 }
 
 // One line on the terminal that is drawn again and again; nothing if there is no terminal.
@@ -127,6 +159,8 @@ int pack(Options options) {
   if (!options.ply.empty()) {
     ist::tools::write_file(options.ply, ist::tools::ply(input, *models.back()));
   }
+  if (!options.exports.empty())
+    export_spheres(input, *models.back(), options.model.packing, options.exports);
   if (!options.picture.empty()) ist::tools::draw(input, models, options.picture);
   return status;
 }

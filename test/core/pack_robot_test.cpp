@@ -7,8 +7,11 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "ist_proximity/robot/robot_description.h"
+#include "support/scene.h"
 #include "support/temp_dir.h"
 
 namespace ist {
@@ -74,6 +77,65 @@ TEST_F(PackRobotTest, tableSpheresAndPictureOfARobot) {
   const std::string ply = read(file("a.ply"));
   EXPECT_NE(ply.find("element vertex " + std::to_string(spheres) + "\n"), std::string::npos);
   EXPECT_EQ(read(file("a.png")).substr(1, 3), "PNG");
+}
+
+// What is inside a link is inside one of its spheres, whichever file they come from.
+TEST_F(PackRobotTest, exportedSpheresContainTheLinks) {
+  ASSERT_EQ(run(kArm + " --no-cache --max-error 0.02 --export urdf " + file("a.urdf") +
+                " --export yaml " + file("a.yaml") + " --export curobo " + file("c.yaml")),
+            0)
+      << said_;
+  EXPECT_NE(said_.find("coverage"), std::string::npos) << said_;
+  const auto find_package = [](const std::string&) { return IST_PROXIMITY_SOURCE_DIR; };
+  const RobotDescription arm = parse_urdf(read(kArm), GeometrySource::kCollision, find_package);
+  const RobotDescription balls =
+      parse_urdf(read(file("a.urdf")), GeometrySource::kCollision, find_package);
+  ASSERT_EQ(balls.links.size(), arm.links.size());
+  EXPECT_EQ(balls.joints.size(), arm.joints.size());
+  test::Rng rng(3);
+  for (std::size_t i = 0; i < arm.links.size(); ++i) {
+    ASSERT_EQ(balls.links[i].name, arm.links[i].name);
+    const Solid solid(arm.links[i].geometry), spheres(balls.links[i].geometry);
+    EXPECT_GT(balls.links[i].geometry.size(), 1U);
+    int inside = 0;
+    for (int k = 0; k < 4000; ++k) {
+      const Eigen::Vector3d p_L(test::uniform(&rng, -0.4, 0.4), test::uniform(&rng, -0.4, 0.4),
+                                test::uniform(&rng, -0.4, 0.4));
+      // A point that is just inside is where a sphere is most likely to fail to reach.
+      const SignedDistance near = solid.signed_distance(p_L);
+      const Eigen::Vector3d p_LC = near.witness - 1e-6 * near.normal;
+      for (const Eigen::Vector3d& p : {p_L, p_LC}) {
+        if (!solid.is_inside(p)) continue;
+        ++inside;
+        EXPECT_TRUE(spheres.is_inside(p)) << arm.links[i].name << " " << p.transpose();
+      }
+    }
+    EXPECT_GT(inside, 2000);
+    for (const std::string& name : {file("a.yaml"), file("c.yaml")}) {
+      const std::string text = read(name);
+      const std::size_t begin = text.find('"' + arm.links[i].name + "\":");
+      ASSERT_NE(begin, std::string::npos) << name;
+    }
+    for (const GeometryElement& element : balls.links[i].geometry) {
+      ASSERT_TRUE(std::holds_alternative<Sphere>(element.shape));
+    }
+  }
+  const auto count = [&](const std::string& name) {
+    const std::string text = read(name), what = "radius: ";
+    std::size_t found = 0;
+    for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) {
+      ++found;
+    }
+    return found;
+  };
+  std::size_t all = 0;
+  for (const LinkDescription& link : balls.links) all += link.geometry.size();
+  EXPECT_EQ(count(file("a.yaml")), all);
+  EXPECT_EQ(count(file("c.yaml")), all);
+  EXPECT_NE(run(kArm + " --export obj " + file("a.obj")), 0);
+  EXPECT_NE(said_.find("curobo"), std::string::npos) << said_;
+  EXPECT_EQ(run(kArm + " --no-cache --export yaml /nowhere/a.yaml"), 1);
+  EXPECT_NE(said_.find("/nowhere/a.yaml"), std::string::npos) << said_;
 }
 
 TEST_F(PackRobotTest, anyNumberOfThreadsGivesTheSameSpheres) {

@@ -42,6 +42,7 @@ Input read_urdf(const std::string& path, GeometrySource source,
                 const std::vector<std::string>& package_dirs) {
   const std::string text = read_text(path);
   Input input;
+  input.urdf_path = path;
   input.robot = parse_urdf(text, source, file_package_finder(path, package_dirs));
   tinyxml2::XMLDocument document;
   document.Parse(text.c_str());

@@ -12,6 +12,7 @@ namespace ist::tools {
 /// The robot to pack, and the poses of its links for a picture.
 struct Input {
   RobotDescription robot;  ///< a mesh is a robot of one link
+  std::string urdf_path;   ///< empty for a mesh
   std::map<std::string, Eigen::Isometry3d>
       X_RL;  ///< by link: link -> root link, all joint positions 0
 };
