@@ -1,5 +1,9 @@
 #include "proximity/conservative_advancement.h"
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 namespace ist {
 
 bool MovedRobot::begin(const JointMotion& motion, const JointPoses& still) {
@@ -15,13 +19,27 @@ bool MovedRobot::begin(const JointMotion& motion, const JointPoses& still) {
   return true;
 }
 
+MotionBound MovedRobot::bound_deviation(std::size_t body, const Eigen::Vector3d& center,
+                                        double radius, const std::vector<double>& deviation) const {
+  JointMotion off{std::vector<double>(deviation.size(), 0.0), deviation, 1.0};
+  for (std::size_t j = 0; j < deviation.size(); ++j) {
+    const Kinematics::Joint& joint = kinematics().joints()[j];
+    if (joint.source == j) continue;
+    off.to[j] = std::max(off.to[j], std::abs(joint.multiplier) * deviation[joint.source]);
+  }
+  return {kinematics(), off, body, center, radius};
+}
+
 void MovedRobot::place(double time, const Eigen::Isometry3d& X_FR) {
   const auto& joints = kinematics().joints();
   const double s = std::min(time / motion_.duration, 1.0);
   moved_ = *still_;
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (!(joint_speed(joints[j], motion_) > 0.0)) continue;
-    moved_.X_PC[j] = kinematics().joint_pose(j, (1.0 - s) * motion_.from[j] + s * motion_.to[j]);
+    const double q = (1.0 - s) * motion_.from[j] + s * motion_.to[j];
+    if (joints[j].type == JointType::kFixed || joints[j].has_unstated_pose() || !std::isfinite(q)) {
+      continue;
+    }
+    moved_.X_PC[j] = kinematics().joint_pose(j, q);
     moved_.known[j] = true;
   }
   forward_.run(moved_, X_FR);

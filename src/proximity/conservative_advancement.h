@@ -32,6 +32,10 @@ class MovedRobot {
                     std::size_t ancestor = 0) const {
     return {kinematics(), motion_, body, center, radius, ancestor};
   }
+  /// Bounds how far such a sphere is from where the motion has it, while no joint is farther from
+  /// it than `deviation` [rad, m]: as the speed of a motion by that much in a second.
+  MotionBound bound_deviation(std::size_t body, const Eigen::Vector3d& center, double radius,
+                              const std::vector<double>& deviation) const;
   double duration() const { return motion_.duration; }  ///< [s]
   const Kinematics& kinematics() const { return forward_.kinematics(); }
   const ForwardKinematics& forward() const { return forward_; }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "ist_proximity/proximity/joint_trajectory.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/proximity/world_query.h"
 #include "ist_proximity/robot/kinematics.h"
@@ -71,6 +72,19 @@ class TimeOfImpact {
   void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
            const std::vector<bool>& wanted, SnapshotSpan clouds,
            Span<const PosedWorld* const> worlds, std::vector<ImpactTime>* results);
+
+  /// The clearance along a trajectory: the first contact of each link, and a bound of its distance
+  /// on the way. Between two distances that are measured, a link moves by no more than the first
+  /// one allows; a quarter of it where it is far from everything.
+  /// @param pieces  of straight_pieces(); mimic joints of which every position is NaN follow
+  /// @param from    [s] of the trajectory: what comes before is over
+  /// @param obstacle_speed  [m/s] >= 0: points and objects may come nearer by so much since `from`
+  /// @param obstacle_age    [s] >= 0: and have for so long before it
+  /// @param results  by link of the model, overwritten; NaN as above, and where times do not rise
+  void run(const StraightPieces& pieces, double from, const JointPoses& still,
+           const Eigen::Isometry3d& X_FR, const std::vector<bool>& wanted, SnapshotSpan clouds,
+           Span<const PosedWorld* const> worlds, double obstacle_speed, double obstacle_age,
+           std::vector<LinkClearance>* results);
 
   /// Sets the robot's surfaces, which worlds are measured with.
   /// @param surfaces  of the model that this was made with, or of one of the same geometry

@@ -1,0 +1,81 @@
+#include "ist_proximity/proximity/joint_trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace ist {
+namespace {
+
+constexpr double kMostPieces = 64.0;
+
+// A joint's polynomial between two waypoints, by its Bezier points.
+struct Polynomial {
+  std::array<double, 6> points{};
+  std::size_t degree = 1;
+
+  double at(double s) const {
+    std::array<double, 6> p = points;
+    for (std::size_t n = degree; n > 0; --n) {
+      for (std::size_t i = 0; i < n; ++i) p[i] = (1.0 - s) * p[i] + s * p[i + 1];
+    }
+    return p[0];
+  }
+  // The largest second derivative for s from 0 to 1, or more.
+  double curvature() const {
+    double largest = 0.0;
+    for (std::size_t i = 0; i + 2 <= degree; ++i) {
+      largest = std::max(largest, std::abs(points[i + 2] - 2.0 * points[i + 1] + points[i]));
+    }
+    return static_cast<double>(degree * (degree - 1)) * largest;
+  }
+};
+
+Polynomial polynomial(const JointTrajectory& trajectory, std::size_t k, std::size_t joint) {
+  const double span = trajectory.times[k + 1] - trajectory.times[k];
+  const double p = trajectory.positions[k][joint], q = trajectory.positions[k + 1][joint];
+  if (trajectory.velocities.empty()) return {{p, q}, 1};
+  const double v = span * trajectory.velocities[k][joint];
+  const double w = span * trajectory.velocities[k + 1][joint];
+  if (trajectory.accelerations.empty()) return {{p, p + v / 3.0, q - w / 3.0, q}, 3};
+  const double a = span * span * trajectory.accelerations[k][joint];
+  const double b = span * span * trajectory.accelerations[k + 1][joint];
+  return {
+      {p, p + v / 5.0, p + 2.0 * v / 5.0 + a / 20.0, q - 2.0 * w / 5.0 + b / 20.0, q - w / 5.0, q},
+      5};
+}
+
+}  // namespace
+
+StraightPieces straight_pieces(const JointTrajectory& trajectory, double max_deviation) {
+  StraightPieces pieces;
+  std::vector<Polynomial> joints;
+  for (std::size_t k = 0; k + 1 < trajectory.times.size(); ++k) {
+    joints.clear();
+    double curvature = 0.0;
+    for (std::size_t j = 0; j < trajectory.positions[k].size(); ++j) {
+      joints.push_back(polynomial(trajectory, k, j));
+      curvature = std::fmax(curvature, joints.back().curvature());  // NaN does not count
+    }
+    const double wanted = std::ceil(std::sqrt(curvature / (8.0 * max_deviation)));
+    const double count = std::clamp(wanted, 1.0, kMostPieces);
+    const double begin = trajectory.times[k], span = trajectory.times[k + 1] - begin;
+    for (double i = 0.0; i < count; ++i) {
+      pieces.times.push_back(begin + span * i / count);
+      std::vector<double> positions, deviations;
+      for (std::size_t j = 0; j < joints.size(); ++j) {
+        positions.push_back(i == 0.0 ? trajectory.positions[k][j] : joints[j].at(i / count));
+        deviations.push_back(std::fmax(joints[j].curvature() / (8.0 * count * count), 0.0));
+      }
+      pieces.positions.push_back(std::move(positions));
+      pieces.deviations.push_back(std::move(deviations));
+    }
+  }
+  if (!trajectory.times.empty()) {
+    pieces.times.push_back(trajectory.times.back());
+    pieces.positions.push_back(trajectory.positions.back());
+  }
+  return pieces;
+}
+
+}  // namespace ist

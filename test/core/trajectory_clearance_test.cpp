@@ -1,0 +1,253 @@
+// The clearance along a trajectory, against dense sampling of the controllers' polynomials.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/proximity/joint_trajectory.h"
+#include "ist_proximity/proximity/time_of_impact.h"
+#include "support/motions.h"
+#include "support/sanitizers.h"
+#include "support/shape_oracle.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+// A joint's position by Hermite's formulas, not by Bezier points as the library has it.
+double position(const JointTrajectory& path, std::size_t joint, double time) {
+  std::size_t k = 0;
+  while (k + 2 < path.times.size() && path.times[k + 1] < time) ++k;
+  const double T = path.times[k + 1] - path.times[k], t = time - path.times[k], s = t / T;
+  const double p = path.positions[k][joint], q = path.positions[k + 1][joint];
+  if (path.velocities.empty()) return p + s * (q - p);
+  const double v = path.velocities[k][joint], w = path.velocities[k + 1][joint];
+  if (path.accelerations.empty()) {
+    const double c2 = (3.0 * (q - p) - (2.0 * v + w) * T), c3 = (2.0 * (p - q) + (v + w) * T);
+    return p + v * t + s * s * (c2 + s * c3);
+  }
+  const double a = path.accelerations[k][joint], b = path.accelerations[k + 1][joint];
+  const double d = q - p;
+  const double c3 = (20.0 * d - (8.0 * w + 12.0 * v) * T - (3.0 * a - b) * T * T) / 2.0;
+  const double c4 = (-30.0 * d + (14.0 * w + 16.0 * v) * T + (3.0 * a - 2.0 * b) * T * T) / 2.0;
+  const double c5 = (12.0 * d - 6.0 * (w + v) * T - (a - b) * T * T) / 2.0;
+  return p + v * t + 0.5 * a * t * t + s * s * s * (c3 + s * (c4 + s * c5));
+}
+
+struct Scene {
+  test::ArmMotion motion;  // its base and points; its joints are not read
+  JointTrajectory path;
+
+  double end() const { return path.times.back(); }
+  // The motion stands where the trajectory is.
+  test::ArmMotion at(double time) const {
+    test::ArmMotion still = motion;
+    still.joints.duration = 1.0;
+    for (std::size_t j = 0; j < still.joints.from.size(); ++j) {
+      still.joints.from[j] = still.joints.to[j] = position(path, j, time);
+    }
+    return still;
+  }
+};
+
+// Up to six waypoints over 1 to 3 s; straight, cubic or quintic.
+Scene random_scene(test::Rng* rng, const test::Arm& arm) {
+  Scene scene;
+  scene.motion = test::random_motion(rng, arm);
+  const auto& joints = arm.kinematics->joints();
+  const int count = 2 + static_cast<int>(test::uniform(rng, 0, 4.999));
+  const int kind = static_cast<int>(test::uniform(rng, 0, 2.999));
+  const std::vector<double> start = scene.motion.joints.from;
+  double time = test::uniform(rng, -1.0, 1.0);
+  std::vector<double> at = start;
+  for (int k = 0; k < count; ++k) {
+    std::vector<double> velocity, acceleration;
+    for (std::size_t j = 0; j < at.size(); ++j) {
+      const double way = joints[j].type == JointType::kPrismatic ? 0.2 : 1.0;
+      if (k > 0 && !std::isnan(start[j])) at[j] += test::uniform(rng, -way, way);
+      const bool is_end = k == 0 || k + 1 == count;
+      velocity.push_back(is_end ? 0.0 : test::uniform(rng, -way, way));
+      acceleration.push_back(is_end ? 0.0 : 3.0 * test::uniform(rng, -way, way));
+    }
+    scene.path.times.push_back(time);
+    scene.path.positions.push_back(at);
+    if (kind > 0) scene.path.velocities.push_back(velocity);
+    if (kind > 1) scene.path.accelerations.push_back(acceleration);
+    time += test::uniform(rng, 0.2, 1.0);
+  }
+  for (Eigen::Vector3d& point : scene.motion.points) {
+    const double when = test::uniform(rng, scene.path.times.front() + 0.2, scene.end() + 0.3);
+    const auto body = arm.bodies[static_cast<std::size_t>(test::uniform(rng, 0, 0.999) *
+                                                          static_cast<double>(arm.size()))];
+    const auto poses = test::sampled_poses(arm, scene.at(std::min(when, scene.end())), 0.5);
+    point = poses[body] * test::random_vector(rng, 0.1);
+  }
+  return scene;
+}
+
+struct Sampled {
+  double contact = kInf, least = kInf;  // [s], [m] until then
+};
+
+Sampled sample(const test::Arm& arm, const Scene& scene, double from) {
+  constexpr double kStep = 5e-4, kFastest = 40.0;
+  Sampled sampled;
+  for (double time = from; time <= scene.end();) {
+    const double distance = test::sampled_distance(arm, scene.at(time), 0.5);
+    sampled.least = std::min(sampled.least, distance);
+    if (distance <= 0.0) {
+      sampled.contact = time;
+      break;
+    }
+    time += kStep * std::max(1.0, std::floor(distance / (kFastest * kStep)));
+  }
+  return sampled;
+}
+
+TEST(TrajectoryClearance, piecesStayNearThePolynomials) {
+  test::Rng rng(5);
+  double largest = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    const test::Arm arm = test::random_arm(&rng);
+    const Scene scene = random_scene(&rng, arm);
+    const StraightPieces pieces = straight_pieces(scene.path);
+    ASSERT_EQ(pieces.positions.size(), pieces.times.size());
+    ASSERT_EQ(pieces.deviations.size() + 1, pieces.times.size());
+    for (std::size_t k = 0; k + 1 < pieces.times.size(); ++k) {
+      ASSERT_LT(pieces.times[k], pieces.times[k + 1]);
+      for (const double s : {0.0, 0.2, 0.5, 0.9, 1.0}) {
+        const double time = (1.0 - s) * pieces.times[k] + s * pieces.times[k + 1];
+        for (std::size_t j = 0; j < pieces.positions[k].size(); ++j) {
+          const double exact = position(scene.path, j, time);
+          if (std::isnan(exact)) continue;
+          const double straight =
+              (1.0 - s) * pieces.positions[k][j] + s * pieces.positions[k + 1][j];
+          const double off = std::abs(exact - straight);
+          ASSERT_LE(off, pieces.deviations[k][j] + 1e-12);
+          largest = std::max(largest, off);
+        }
+      }
+    }
+  }
+  EXPECT_GT(largest, 1e-4);
+}
+
+TEST(TrajectoryClearance, neverLateAndHardlyEarly) {
+  test::Rng rng(6);
+  int trajectories = 0, contacts = 0, close = 0, tight = 0, free = 0;
+  while (trajectories < test::scaled(1000)) {
+    const test::Arm arm = test::random_arm(&rng);
+    QueryConfig config;
+    config.max_distance = 0.5;
+    TimeOfImpact impacts(arm.model, arm.kinematics, config);
+    for (int i = 0; i < 20; ++i) {
+      const Scene scene = random_scene(&rng, arm);
+      const bool is_begun = test::uniform(&rng, 0, 1) < 0.3;
+      const double from =
+          is_begun ? test::uniform(&rng, scene.path.times[0], scene.end()) : scene.path.times[0];
+      const CloudSnapshot cloud = test::make_snapshot(scene.motion.points);
+      std::vector<LinkClearance> found;
+      impacts.run(straight_pieces(scene.path), from, scene.motion.still, scene.motion.X_FR,
+                  std::vector<bool>(arm.size(), true), {&cloud}, {}, 0.0, 0.0, &found);
+      LinkClearance all;
+      all.contact_time = kInf;
+      for (const LinkClearance& one : found) {
+        ASSERT_FALSE(std::isnan(one.contact_time));
+        all.contact_time = std::min(all.contact_time, one.contact_time);
+        all.lower_bound = std::fmin(all.lower_bound, one.lower_bound);
+      }
+      const Sampled truth = sample(arm, scene, from);
+      ASSERT_LE(all.contact_time, truth.contact) << "late";
+      const double until =
+          all.contact_time < kInf
+              ? std::max(test::sampled_distance(arm, scene.at(all.contact_time), 0.5), 0.0)
+              : truth.least;
+      ASSERT_LE(all.lower_bound, until + 1e-9) << "too far";
+      ++trajectories;
+      if (truth.contact < kInf) {
+        ++contacts;
+        const bool is_in_time = truth.contact - all.contact_time <= 0.02;
+        const bool is_near = test::sampled_distance(arm, scene.at(all.contact_time), 0.5) <= 0.005;
+        close += is_in_time || is_near ? 1 : 0;
+      } else {
+        ++free;
+        const bool is_near = all.contact_time < kInf &&
+                             test::sampled_distance(arm, scene.at(all.contact_time), 0.5) <= 0.005;
+        close += all.contact_time == kInf || is_near ? 1 : 0;
+        const double least = std::min(truth.least, 0.5);
+        tight += all.lower_bound >= std::min(0.75 * least, least - 0.002) - 0.012 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GE(close, 0.99 * trajectories);
+  EXPECT_GE(tight, 0.99 * free);
+  EXPECT_GT(contacts, trajectories / 4);
+  EXPECT_GT(free, trajectories / 10);
+}
+
+// Points that come straight towards a link that stands reach it when the bound says so.
+TEST(TrajectoryClearance, obstaclesThatComeNearer) {
+  test::Rng rng(7);
+  const test::Arm arm = test::random_arm(&rng);
+  Scene scene = random_scene(&rng, arm);
+  for (std::size_t k = 1; k < scene.path.times.size(); ++k) {
+    scene.path.positions[k] = scene.path.positions[0];
+  }
+  scene.path.velocities.clear();
+  scene.path.accelerations.clear();
+  QueryConfig config;
+  config.max_distance = 3.0;
+  TimeOfImpact impacts(arm.model, arm.kinematics, config);
+  const double from = scene.path.times[0];
+  scene.motion.points = {Eigen::Vector3d(2.0, 0.3, 0.1)};
+  const double distance = test::sampled_distance(arm, scene.at(from), 0.5);
+  ASSERT_GT(distance, 0.1);
+  scene.path.times = {from, from + 100.0};
+  scene.path.positions.resize(2);
+  const CloudSnapshot cloud = test::make_snapshot(scene.motion.points);
+  const double speed = 0.5, age = 0.1;
+  std::vector<LinkClearance> found;
+  impacts.run(straight_pieces(scene.path), from, scene.motion.still, scene.motion.X_FR,
+              std::vector<bool>(arm.size(), true), {&cloud}, {}, speed, age, &found);
+  double first = kInf;
+  for (const LinkClearance& one : found) first = std::min(first, one.contact_time);
+  EXPECT_NEAR(first, from + distance / speed - age, 0.01);
+  EXPECT_LE(first, from + distance / speed - age);
+}
+
+TEST(TrajectoryClearance, whatIsNotKnownIsNotFree) {
+  test::Rng rng(8);
+  const test::Arm arm = test::random_arm(&rng);
+  const Scene scene = random_scene(&rng, arm);
+  const CloudSnapshot cloud = test::make_snapshot(scene.motion.points);
+  TimeOfImpact impacts(arm.model, arm.kinematics, QueryConfig());
+  const StraightPieces pieces = straight_pieces(scene.path);
+  const std::vector<bool> all(arm.size(), true);
+  const auto run = [&](const StraightPieces& path, SnapshotSpan clouds, double speed) {
+    std::vector<LinkClearance> found;
+    impacts.run(path, pieces.times[0], scene.motion.still, scene.motion.X_FR, all, clouds, {},
+                speed, 0.0, &found);
+    EXPECT_EQ(found.size(), arm.size());
+    return std::all_of(found.begin(), found.end(), [](const LinkClearance& one) {
+      return std::isnan(one.contact_time) && std::isnan(one.lower_bound);
+    });
+  };
+  EXPECT_FALSE(run(pieces, {&cloud}, 0.0));
+  EXPECT_TRUE(run(pieces, {}, 0.0)) << "no cloud";
+  EXPECT_TRUE(run({}, {&cloud}, 0.0)) << "no trajectory";
+  EXPECT_TRUE(run(pieces, {&cloud}, -1.0));
+  EXPECT_TRUE(run(pieces, {&cloud}, std::nan("")));
+  StraightPieces broken = pieces;
+  broken.times.back() = broken.times[broken.times.size() - 2];
+  EXPECT_TRUE(pieces.times.size() > 2 || run(broken, {&cloud}, 0.0)) << "time stands still";
+  broken = pieces;
+  broken.positions.back().pop_back();
+  EXPECT_TRUE(run(broken, {&cloud}, 0.0)) << "a joint is missing";
+}
+
+}  // namespace
+}  // namespace ist
