@@ -1,6 +1,7 @@
 # The interface for other ROS packages: dependencies, messages and exports.
 
 find_package(catkin REQUIRED COMPONENTS
+  actionlib_msgs
   diagnostic_msgs
   dynamic_reconfigure
   geometry_msgs
@@ -29,6 +30,7 @@ add_message_files(DIRECTORY msg FILES
   ProximityArray.msg
   SourceStatus.msg
   SpeedScaleState.msg
+  TrajectoryClearance.msg
   WorldObject.msg
   WorldObjects.msg
   WorldOctomap.msg)
@@ -43,6 +45,7 @@ catkin_package(
   INCLUDE_DIRS include
   LIBRARIES ist_proximity_core ist_proximity_ros
   CATKIN_DEPENDS
+    actionlib_msgs
     diagnostic_msgs
     dynamic_reconfigure
     geometry_msgs

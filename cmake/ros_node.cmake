@@ -61,6 +61,7 @@ install(DIRECTORY config demo examples launch DESTINATION ${CATKIN_PACKAGE_SHARE
 # The script in the repository is not executable: rosrun would find two programs of that name.
 catkin_install_python(PROGRAMS scripts/proximity_table scripts/proximity_rviz
   src/nodes/planning_scene_bridge
+  src/nodes/trajectory_bridge
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 install(FILES src/nodes/scene_objects.py src/nodes/scene_state.py
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

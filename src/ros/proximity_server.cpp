@@ -79,9 +79,14 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
         private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1), kDrawnUnseen,
         buffer_);
   }
+  trajectory_watch_ = std::make_unique<TrajectoryWatch>(nh_, private_nh_, config_, sources_,
+                                                        buffer_, unknown_space_.get(), live);
   query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live,
-                                                  unknown_space_.get(),
-                                                  [this] { publish_diagnostics_when_due(); });
+                                                  unknown_space_.get(), [this] {
+                                                    publish_diagnostics_when_due();
+                                                    trajectory_watch_->run_when_due();
+                                                  });
+  trajectory_watch_->subscribe(query_service_->queue());
   if (config_.self_collision.enabled) {
     self_proximity_ =
         std::make_unique<SelfProximity>(private_nh_, config_, buffer_, joint_states_.get(), live);
@@ -99,6 +104,8 @@ ProximityServer::Impl::~Impl() {
   model_thread_.stop();
   pose_thread_.stop();
   warm_up_.end();
+  query_service_->stop();
+  trajectory_watch_.reset();
   query_service_.reset();
   self_proximity_.reset();
   link_pairs_.reset();

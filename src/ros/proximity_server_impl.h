@@ -39,6 +39,7 @@
 #include "ros/services/self_proximity.h"
 #include "ros/status/cycle_report.h"
 #include "ros/status/diagnostics_publisher.h"
+#include "ros/trajectory/trajectory_watch.h"
 
 namespace ist {
 
@@ -125,6 +126,7 @@ class ProximityServer::Impl {
   ros::Time last_stamp_;  ///< of the last ~proximity
   Clock::time_point next_markers_;
 
+  std::unique_ptr<TrajectoryWatch> trajectory_watch_;
   std::unique_ptr<QueryService> query_service_;
   std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
   std::unique_ptr<LinkPairService> link_pairs_;    ///< the same

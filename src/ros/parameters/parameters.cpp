@@ -56,6 +56,12 @@ std::vector<Parameter> startup_parameters(ServerConfig* config) {
       {"self_collision/in_minimum", &self.in_minimum},
       {"attach/max_objects", &config->attach.max_objects, Range::non_negative("", 1e4)},
       {"attach/max_time", &config->attach.max_time, Range::positive("s", 3600.0)},
+      {"trajectory/tolerance", &config->trajectory.tolerance, Range::positive("rad or m", 10.0)},
+      {"trajectory/deceleration", &config->trajectory.deceleration,
+       Range::non_negative("rad/s^2 or m/s^2", 1e3)},
+      {"trajectory/obstacle_speed", &config->trajectory.obstacle_speed,
+       Range::non_negative("m/s", 100.0)},
+      {"trajectory/cancel_topic", &config->trajectory.cancel_topic},
       {"unknown_space", choice(&config->unknown_space, {"free", "obstacle", "report"})},
       {"cache_directory", &config->model.cache_directory},
   };
@@ -292,6 +298,10 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
     source.ingest.search_distance = config.query.max_distance;
   }
   check_unknown_space(&reader, config);
+  if (!config.trajectory.cancel_topic.empty() && config.trajectory.deceleration == 0.0) {
+    reader.add_error("trajectory/cancel_topic",
+                     "needs ~trajectory/deceleration: nobody knows when braking is due without it");
+  }
   if (config.self_collision.in_minimum && !config.self_collision.enabled) {
     warnings->push_back("~self_collision/in_minimum has no effect without ~self_collision/enabled");
   }

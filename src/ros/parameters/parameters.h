@@ -67,6 +67,14 @@ struct AttachConfig {
   double max_time = 30.0;  ///< [s] for one object, reading and packing it included; > 0
 };
 
+/// Parameters of ~trajectory.
+struct TrajectoryConfig {
+  double tolerance = 0.1;       ///< [rad, m] how far joints may be from the trajectory; > 0
+  double deceleration = 0.0;    ///< [rad/s^2, m/s^2] of each joint while braking; 0: not known
+  double obstacle_speed = 0.0;  ///< [m/s] obstacles may come this fast; >= 0
+  std::string cancel_topic;     ///< of an action; empty: nothing is cancelled
+};
+
 /// Parameters that may change while the node runs.
 struct LiveConfig {
   QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
@@ -92,6 +100,7 @@ struct ServerConfig : LiveConfig {
   ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   SelfCollisionConfig self_collision;
   AttachConfig attach;
+  TrajectoryConfig trajectory;
   /// Links that do not count in ~min_distance, ~speed_scale and the summary of the diagnostics.
   std::vector<std::string> ignore_links;
   bool fixed_links_count = false;  ///< ~min_distance/fixed_links: links that cannot move count too

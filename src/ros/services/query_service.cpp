@@ -43,11 +43,9 @@ QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& confi
                            std::function<LiveConfig()> live, UnknownSpaceWatch* watch,
                            std::function<void()> meanwhile)
     : config_(config),
-      sources_(sources),
-      buffer_(buffer),
       live_(std::move(live)),
-      watch_(watch),
       meanwhile_(std::move(meanwhile)),
+      stated_(config, sources, buffer, watch),
       self_(config) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
@@ -60,11 +58,6 @@ QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& confi
 QueryService::~QueryService() {
   thread_.stop();
   service_.shutdown();
-}
-
-void QueryService::set_model(std::shared_ptr<const ModelState> model) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  newest_model_ = std::move(model);
 }
 
 /// Bounds the time and the memory of a request.
@@ -112,58 +105,30 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   return true;
 }
 
-/// Takes the newest model.
-/// @returns empty, or why there is none
-std::string QueryService::take_model() {
-  std::shared_ptr<const ModelState> model;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    model = newest_model_;
-  }
-  if (!model || !model->is_ready()) {
-    return model ? model->problem : "the robot's model is not ready yet";
-  }
-  if (!model->kinematics) return no_kinematics(*model);
-  if (model == model_) return "";
-  const bool is_refined = cycle_ && model_ && is_refinement(*model_, *model);
-  model_ = std::move(model);
-  if (is_refined) {
-    cycle_->refine(model_);
-    return "";
-  }
-  auto poses = std::make_unique<StatedPoseSource>(model_->kinematics, buffer_,
-                                                  fixed_frame_of(*model_, config_),
-                                                  link_names(*model_->robot), config_.pose_timeout);
-  poses_ = poses.get();
-  cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
-                                            CloudSelection::Reader::kOther, watch_);
-  impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
-  return "";
-}
-
 /// Chooses the links to answer for.
 /// @returns empty, or the name that is not a monitored link
 std::string QueryService::choose_links(const std::vector<std::string>& links) {
-  chosen_.assign(model_->links.size(), links.empty());
+  const ModelState& model = *stated_.model();
+  chosen_.assign(model.links.size(), links.empty());
   for (const std::string& name : links) {
-    const auto found = std::find(model_->links.begin(), model_->links.end(), name);
-    if (found == model_->links.end()) return "link '" + name + "' is not monitored";
-    chosen_[static_cast<std::size_t>(found - model_->links.begin())] = true;
+    const auto found = std::find(model.links.begin(), model.links.end(), name);
+    if (found == model.links.end()) return "link '" + name + "' is not monitored";
+    chosen_[static_cast<std::size_t>(found - model.links.begin())] = true;
   }
-  std::vector<bool> wanted = wanted_links(*model_);
+  std::vector<bool> wanted = wanted_links(model);
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    if (!chosen_[i]) wanted[model_->monitored[i]] = false;
+    if (!chosen_[i]) wanted[model.monitored[i]] = false;
   }
-  poses_->set_wanted(wanted);
+  stated_.poses().set_wanted(wanted);
   return "";
 }
 
 std::string QueryService::run(const Service::Request& request, Service::Response* response) {
   std::string problem = check_times(request.times, request.states.size());
-  if (problem.empty()) problem = take_model();
+  if (problem.empty()) problem = stated_.take_model();
   if (problem.empty()) problem = choose_links(request.links);
   if (problem.empty() && request.self_proximity != 0) {
-    self_.set_model(model_);
+    self_.set_model(stated_.model());
     self_.choose(chosen_);
   }
   if (problem.empty()) problem = check_size(request);
@@ -173,14 +138,12 @@ std::string QueryService::run(const Service::Request& request, Service::Response
   live.query.deadline = 0.0;
   std::vector<std::vector<double>> positions;
   for (std::size_t i = 0; i < request.states.size(); ++i) {
-    problem = poses_->state(request.states[i]);
-    if (!problem.empty()) return "states[" + std::to_string(i) + "]: " + problem;
-    positions.push_back(poses_->positions());
     response->results.emplace_back();
     ProximityArray& result = response->results.back();
-    cycle_->forget();  // the configurations are no motion, so there is no speed between them
-    cycle_->run(ros::Time::now(), sources_, live, "", &result);
-    if (request.self_proximity != 0) self_.add(*poses_, live.query, &response->pairs);
+    problem = stated_.run(request.states[i], live, &result);
+    if (!problem.empty()) return "states[" + std::to_string(i) + "]: " + problem;
+    positions.push_back(stated_.poses().positions());
+    if (request.self_proximity != 0) self_.add(stated_.poses(), live.query, &response->pairs);
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }
@@ -188,7 +151,6 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     if (!thread_.is_running()) return "the node ends";
   }
   if (request.times.empty()) return "";
-  impacts_->set_config(live.query);
   return find_impact_times(request, positions, live.query, response);
 }
 
@@ -227,31 +189,27 @@ void note_impacts(const std::vector<ImpactTime>& impacts, double begin, std::vec
 std::string QueryService::find_impact_times(const Service::Request& request,
                                             const std::vector<std::vector<double>>& positions,
                                             const QueryConfig& query, Service::Response* response) {
-  const auto& joints = model_->kinematics->joints();
-  std::vector<bool> wanted = cycle_->measurable();
+  const ModelState& model = *stated_.model();
+  const StatedPoseSource& poses = stated_.poses();
+  std::vector<bool> wanted = stated_.measurable();
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    const std::size_t link = model_->monitored[i];
-    // Nothing is known of the motion while the root link has no pose.
-    wanted[link] = wanted[link] && chosen_[i] && poses_->is_root_known();
+    if (!chosen_[i]) wanted[model.monitored[i]] = false;
   }
   std::vector<double> first;
   first.reserve(wanted.size());
   for (const bool one : wanted) first.push_back(one ? kInfinity : std::nan(""));
   if (request.self_proximity != 0) self_.begin_motion();
   JointPoses still;  // nothing is known of the motion while the root link has no pose
-  if (poses_->is_root_known()) still = poses_->joints();
-  if (cycle_->has_worlds()) {
-    const WorldAnswers& answers = cycle_->world_answers();
-    impacts_->set_surfaces(answers.surfaces(), answers.link_margins(*model_->robot));
-  }
+  if (poses.is_root_known()) still = poses.joints();
+  TimeOfImpact& times = stated_.impacts(query);
   std::vector<ImpactTime> impacts;
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
     const JointMotion motion{positions[k], positions[k + 1],
                              request.times[k + 1] - request.times[k]};
-    std::string half_stated = half_stated_joint(joints, motion, k);
+    std::string half_stated = half_stated_joint(model.kinematics->joints(), motion, k);
     if (!half_stated.empty()) return half_stated;
-    impacts_->run(motion, poses_->joints(), poses_->X_FR(), wanted, cycle_->clouds(),
-                  cycle_->worlds(), &impacts);
+    times.run(motion, poses.joints(), poses.X_FR(), wanted, stated_.cycle().clouds(),
+              stated_.cycle().worlds(), &impacts);
     if (request.self_proximity != 0) self_.advance(motion, request.times[k], still, query);
     note_impacts(impacts, request.times[k], &first, &wanted);
     meanwhile_();
@@ -259,8 +217,8 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   }
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     if (!chosen_[i]) continue;
-    response->impact_links.push_back(model_->links[i]);
-    response->impact_times.push_back(first[model_->monitored[i]]);
+    response->impact_links.push_back(model.links[i]);
+    response->impact_times.push_back(first[model.monitored[i]]);
   }
   if (request.self_proximity != 0) response->pair_impact_times = self_.impact_times();
   return "";

@@ -7,18 +7,14 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "ist_proximity/proximity/time_of_impact.h"
 #include "ros/common/callback_thread.h"
-#include "ros/cycle/proximity_cycle.h"
-#include "ros/input/unknown_space.h"
-#include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
-#include "ros/poses/stated_pose_source.h"
 #include "ros/services/self_query_answer.h"
+#include "ros/services/stated_cycle.h"
 
 namespace ist {
 
@@ -38,7 +34,13 @@ class QueryService {
   ~QueryService();
 
   /// Thread safe.
-  void set_model(std::shared_ptr<const ModelState> model);
+  void set_model(std::shared_ptr<const ModelState> model) { stated_.set_model(std::move(model)); }
+
+  /// Ends the service's thread.
+  void stop() { thread_.stop(); }
+
+  /// The queue of that thread.
+  ros::CallbackQueue* queue() { return thread_.queue(); }
 
  private:
   using Service = ist_proximity::QueryProximity;
@@ -48,28 +50,18 @@ class QueryService {
   std::string find_impact_times(const Service::Request& request,
                                 const std::vector<std::vector<double>>& positions,
                                 const QueryConfig& query, Service::Response* response);
-  std::string take_model();
   std::string choose_links(const std::vector<std::string>& links);
   std::string check_size(const Service::Request& request) const;
   void return_memory();
 
   const ServerConfig config_;
-  const CloudSources& sources_;
-  const TransformBuffer& buffer_;
   const std::function<LiveConfig()> live_;
-  UnknownSpaceWatch* const watch_;  ///< null with ~unknown_space free
   const std::function<void()> meanwhile_;
   CallbackThread thread_;
   ros::ServiceServer service_;
 
-  std::mutex mutex_;
-  std::shared_ptr<const ModelState> newest_model_;
+  StatedCycle stated_;  ///< used by the service's thread alone, as all that follows
 
-  // Used by the service's thread alone.
-  std::shared_ptr<const ModelState> model_;
-  StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle
-  std::unique_ptr<ProximityCycle> cycle_;
-  std::unique_ptr<TimeOfImpact> impacts_;
   SelfQueryAnswer self_;
   std::vector<bool> chosen_;  ///< by monitored link
   /// Memory of a large answer is until then returned to the system: roscpp frees it after

@@ -1,0 +1,63 @@
+#include "ros/services/stated_cycle.h"
+
+#include <utility>
+
+namespace ist {
+
+void StatedCycle::set_model(std::shared_ptr<const ModelState> model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  newest_model_ = std::move(model);
+}
+
+std::string StatedCycle::take_model() {
+  std::shared_ptr<const ModelState> model;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    model = newest_model_;
+  }
+  if (!model || !model->is_ready()) {
+    return model ? model->problem : "the robot's model is not ready yet";
+  }
+  if (!model->kinematics) return no_kinematics(*model);
+  if (model == model_) return "";
+  const bool is_refined = cycle_ && model_ && is_refinement(*model_, *model);
+  model_ = std::move(model);
+  if (is_refined) {
+    cycle_->refine(model_);
+    return "";
+  }
+  auto poses = std::make_unique<StatedPoseSource>(model_->kinematics, buffer_,
+                                                  fixed_frame_of(*model_, config_),
+                                                  link_names(*model_->robot), config_.pose_timeout);
+  poses_ = poses.get();
+  cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
+                                            CloudSelection::Reader::kOther, watch_);
+  impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
+  return "";
+}
+
+std::string StatedCycle::run(const sensor_msgs::JointState& configuration, const LiveConfig& live,
+                             ist_proximity::ProximityArray* result) {
+  std::string problem = poses_->state(configuration);
+  if (!problem.empty()) return problem;
+  cycle_->forget();  // the configurations are no motion, so there is no speed between them
+  cycle_->run(ros::Time::now(), sources_, live, "", result);
+  return "";
+}
+
+TimeOfImpact& StatedCycle::impacts(const QueryConfig& query) {
+  impacts_->set_config(query);
+  if (cycle_->has_worlds()) {
+    const WorldAnswers& answers = cycle_->world_answers();
+    impacts_->set_surfaces(answers.surfaces(), answers.link_margins(*model_->robot));
+  }
+  return *impacts_;
+}
+
+std::vector<bool> StatedCycle::measurable() const {
+  // Nothing is known of the motion while the root link has no pose.
+  if (!poses_->is_root_known()) return std::vector<bool>(model_->robot->links.size(), false);
+  return cycle_->measurable();
+}
+
+}  // namespace ist

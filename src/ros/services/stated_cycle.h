@@ -1,0 +1,70 @@
+#pragma once
+
+#include <ist_proximity/ProximityArray.h>
+#include <ros/time.h>
+#include <sensor_msgs/JointState.h>
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/proximity/time_of_impact.h"
+#include "ros/cycle/proximity_cycle.h"
+#include "ros/input/unknown_space.h"
+#include "ros/model/model_state.h"
+#include "ros/parameters/parameters.h"
+#include "ros/poses/stated_pose_source.h"
+
+namespace ist {
+
+/// Queries of configurations that the robot need not be in, and of motions that begin there,
+/// against the obstacles of now. It has a cycle of its own, so that it never delays the node's. One
+/// thread, but for set_model().
+class StatedCycle {
+ public:
+  /// @param sources, buffer  outlive this
+  /// @param watch            outlives this; null with ~unknown_space free
+  StatedCycle(const ServerConfig& config, const CloudSources& sources,
+              const TransformBuffer& buffer, UnknownSpaceWatch* watch)
+      : config_(config), sources_(sources), buffer_(buffer), watch_(watch) {}
+
+  /// Thread safe.
+  void set_model(std::shared_ptr<const ModelState> model);
+
+  /// Takes the newest model.
+  /// @returns empty, or why there is none
+  std::string take_model();
+
+  /// Measures one configuration; joints that it leaves out are where they are now.
+  /// @param live  its deadline counts
+  /// @returns empty, or why the configuration cannot be taken
+  std::string run(const sensor_msgs::JointState& configuration, const LiveConfig& live,
+                  ist_proximity::ProximityArray* result);
+
+  /// Makes times of impact ready for the obstacles of the last run().
+  TimeOfImpact& impacts(const QueryConfig& query);
+  /// By link of the robot: whether a motion that begins at the last run() can be answered.
+  std::vector<bool> measurable() const;
+
+  // Valid after take_model().
+  const std::shared_ptr<const ModelState>& model() const { return model_; }
+  StatedPoseSource& poses() const { return *poses_; }
+  const ProximityCycle& cycle() const { return *cycle_; }
+
+ private:
+  const ServerConfig config_;
+  const CloudSources& sources_;
+  const TransformBuffer& buffer_;
+  UnknownSpaceWatch* const watch_;  ///< null with ~unknown_space free
+
+  std::mutex mutex_;
+  std::shared_ptr<const ModelState> newest_model_;
+
+  std::shared_ptr<const ModelState> model_;
+  StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle
+  std::unique_ptr<ProximityCycle> cycle_;
+  std::unique_ptr<TimeOfImpact> impacts_;
+};
+
+}  // namespace ist

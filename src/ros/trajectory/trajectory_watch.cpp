@@ -1,0 +1,294 @@
+#include "ros/trajectory/trajectory_watch.h"
+
+#include <actionlib_msgs/GoalID.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "internal/geometry/numbers.h"
+#include "ros/common/publish.h"
+#include "ros/common/stopwatch.h"
+#include "ros/common/text.h"
+
+namespace ist {
+namespace {
+
+// An answer is given as often as this, and with every new cloud.
+constexpr std::chrono::milliseconds kPeriod(100);
+constexpr double kWakeUp = 0.01;  // [s]
+// [s] A goal is cancelled so much before braking is due, for the thread and the message.
+constexpr double kAhead = 0.02;
+// Positions of joints that are older than this are not known.
+constexpr std::chrono::milliseconds kStateTimeout(500);
+constexpr std::size_t kMaxJoints = 10000;
+
+ros::Time after(const ros::Time& start, double seconds) {
+  const double time = start.toSec() + seconds;
+  return time > 0.0 ? ros::Time(time) : ros::Time();
+}
+
+}  // namespace
+
+TrajectoryWatch::TrajectoryWatch(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
+                                 const ServerConfig& config, const CloudSources& sources,
+                                 const TransformBuffer& buffer, UnknownSpaceWatch* watch,
+                                 std::function<LiveConfig()> live)
+    : nh_(nh),
+      private_nh_(private_nh),
+      config_(config),
+      live_(std::move(live)),
+      stated_(config, sources, buffer, watch) {
+  publisher_ = private_nh_.advertise<Message>("trajectory_clearance", 10);
+  if (!config.trajectory.cancel_topic.empty()) {
+    cancel_ = nh_.advertise<actionlib_msgs::GoalID>(config.trajectory.cancel_topic, 10);
+  }
+}
+
+void TrajectoryWatch::subscribe(ros::CallbackQueue* queue) {
+  nh_.setCallbackQueue(queue);
+  private_nh_.setCallbackQueue(queue);
+  trajectories_ = private_nh_.subscribe("trajectory", 10, &TrajectoryWatch::receive, this);
+}
+
+void TrajectoryWatch::receive(const trajectory_msgs::JointTrajectoryConstPtr& message) {
+  received_ = message;
+  received_time_ = ros::Time::now();
+  is_watching_ = true;
+  last_look_ = Clock::time_point();
+  if (states_) return timer_.start();
+  // Whoever sends no trajectory pays for nothing.
+  listening_since_ = Clock::now();
+  states_ = nh_.subscribe("joint_states", 100, &TrajectoryWatch::receive_state, this);
+  timer_ = private_nh_.createWallTimer(ros::WallDuration(kWakeUp),
+                                       [this](const ros::WallTimerEvent&) { run_when_due(); });
+}
+
+void TrajectoryWatch::receive_state(const sensor_msgs::JointStateConstPtr& message) {
+  const std::size_t count = std::min(message->name.size(), message->position.size());
+  if (positions_.size() + count > kMaxJoints) positions_.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(message->position[i])) continue;
+    positions_[message->name[i]] = {message->position[i], Clock::now()};
+  }
+}
+
+double TrajectoryWatch::present_position(const std::string& joint) const {
+  const auto found = positions_.find(joint);
+  const bool is_known =
+      found != positions_.end() && Clock::now() - found->second.received <= kStateTimeout;
+  return is_known ? found->second.q : kNaN;
+}
+
+// Reads the newest message. @returns empty, or why nothing can be watched now
+std::string TrajectoryWatch::take_trajectory() {
+  std::string problem = stated_.take_model();
+  if (!problem.empty()) return problem;
+  if (received_ && received_->points.empty()) {  // controllers stop at one
+    received_.reset();
+    is_watching_ = false;
+    refusal_.clear();
+    return "";
+  }
+  if (received_) {
+    // The first joint states may still be on their way.
+    const bool needs_states = received_->points[0].time_from_start.toSec() > 0.0;
+    const bool may_come = ros::Time::now() < received_time_ + ros::Duration(0.2);
+    if (needs_states && positions_.empty() && may_come) return "joint states are waited for";
+    trajectory_ = WatchedTrajectory();
+    refusal_ = read_trajectory(
+        *received_, *stated_.model()->kinematics,
+        [this](const std::string& joint) { return present_position(joint); }, received_time_,
+        &trajectory_);
+    received_.reset();
+    model_ = stated_.model();
+    if (!refusal_.empty()) {
+      refusal_ =
+          "the last trajectory is not watched, and neither is what ran before it: " + refusal_;
+    }
+  }
+  if (refusal_.empty() && model_->kinematics != stated_.model()->kinematics) {
+    refusal_ = "the robot is another one since the trajectory came: send it again";
+  }
+  return refusal_;
+}
+
+// Compares the robot with the trajectory. @returns empty, or which joint is where
+std::string TrajectoryWatch::why_elsewhere(double time) const {
+  const std::vector<double> q = trajectory_.positions(time);
+  for (const std::size_t joint : trajectory_.joints) {
+    const std::string& name = model_->kinematics->joints()[joint].name;
+    const double present = present_position(name);
+    if (std::isnan(present)) {
+      return "the position of joint '" + name + "' is not known: joint_states must hold it";
+    }
+    if (std::abs(present - q[joint]) <= config_.trajectory.tolerance) continue;
+    return format_text(
+        "the robot does not follow the trajectory: joint '%s' is at %.3f and should be at %.3f, "
+        "which is more than ~trajectory/tolerance (%g)",
+        name.c_str(), present, q[joint], config_.trajectory.tolerance);
+  }
+  return "";
+}
+
+void TrajectoryWatch::run_when_due() {
+  if (!is_watching_) return timer_.stop();
+  const ros::Time now = ros::Time::now();
+  cancel_when_due(now);
+  Message message;
+  message.header.stamp = now;
+  const std::string problem = take_trajectory();
+  if (!is_watching_) return publish(&message, Message::NONE, "no trajectory is watched");
+  if (!problem.empty()) {
+    if (Clock::now() - last_look_ < kPeriod) return;
+    return publish(&message, Message::UNKNOWN, problem);
+  }
+  message.header.frame_id = fixed_frame_of(*model_, config_);
+  message.start = trajectory_.start;
+  message.end = after(trajectory_.start, trajectory_.end());
+  if (now >= message.end) {
+    is_watching_ = false;
+    return publish(&message, Message::NONE, "the trajectory is over");
+  }
+  look(now, &message);
+}
+
+// Answers where a cloud is new, or the last answer is old.
+void TrajectoryWatch::look(const ros::Time& now, Message* message) {
+  const double time = std::max((now - trajectory_.start).toSec(), 0.0);
+  Stopwatch watch;
+  LiveConfig live = live_();
+  live.query.deadline = 0.0;
+  std::string problem = why_elsewhere(time);
+  if (problem.empty()) {
+    problem = stated_.run(trajectory_.state(*model_->kinematics, time), live, &here_);
+  }
+  const SnapshotSpan clouds = stated_.cycle().clouds();
+  const bool is_new = !std::equal(clouds.begin(), clouds.end(), clouds_.begin(), clouds_.end());
+  if (!is_new && Clock::now() - last_look_ < kPeriod) return;
+  clouds_.assign(clouds.begin(), clouds.end());
+  if (!problem.empty()) return publish(message, Message::UNKNOWN, problem);
+  const double age =
+      here_.cloud_stamp.isZero() ? 0.0 : std::max((now - here_.cloud_stamp).toSec(), 0.0);
+  std::vector<bool> wanted = stated_.measurable();
+  const std::vector<bool> moved = moved_links();
+  for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = wanted[i] && moved[i];
+  std::vector<LinkClearance> found;
+  stated_.impacts(live.query)
+      .run(trajectory_.pieces, time, stated_.poses().joints(), stated_.poses().X_FR(), wanted,
+           clouds, stated_.cycle().worlds(), config_.trajectory.obstacle_speed, age, &found);
+  fill(found, time, message);
+  message->computation_time = watch.lap();
+  publish(message, message->state, message->text);
+}
+
+// By link of the robot: whether it counts, and the trajectory moves it.
+std::vector<bool> TrajectoryWatch::moved_links() const {
+  const RobotModel& robot = *model_->robot;
+  const Kinematics& kinematics = *model_->kinematics;
+  const std::vector<std::size_t>& moved = trajectory_.joints;
+  std::vector<bool> links(robot.links.size(), false);
+  for (const std::size_t link : model_->monitored) {
+    const std::string& name = robot.links[link].name;
+    const std::vector<std::string>& ignored = config_.ignore_links;
+    if (std::find(ignored.begin(), ignored.end(), name) != ignored.end()) continue;
+    const auto body = kinematics.find_body(name);
+    if (!body) continue;
+    for (std::size_t at = *body; at != 0; at = kinematics.joints()[at - 1].parent) {
+      const std::size_t source = kinematics.joints()[at - 1].source;
+      if (std::find(moved.begin(), moved.end(), source) != moved.end() ||
+          std::find(moved.begin(), moved.end(), at - 1) != moved.end()) {
+        links[link] = true;
+      }
+    }
+  }
+  return links;
+}
+
+// @param now  [s] of the trajectory
+void TrajectoryWatch::fill(const std::vector<LinkClearance>& found, double now, Message* message) {
+  const std::vector<bool> moved = moved_links();
+  double contact = kInfinity;
+  std::size_t first = 0;
+  std::string unknown;
+  message->lower_bound = kInfinity;
+  for (std::size_t i = 0; i < model_->monitored.size(); ++i) {
+    const std::size_t link = model_->monitored[i];
+    if (!moved[link]) continue;
+    const LinkClearance& one = found[link];
+    message->links.push_back(model_->links[i]);
+    message->lower_bounds.push_back(one.lower_bound);
+    if (std::isnan(one.contact_time)) {
+      if (unknown.empty()) unknown = model_->links[i];
+      continue;
+    }
+    message->lower_bound = std::min(message->lower_bound, one.lower_bound);
+    if (one.contact_time < contact) {
+      contact = one.contact_time;
+      first = i;
+    }
+  }
+  if (!unknown.empty()) {
+    message->lower_bound = kNaN;
+    message->state = Message::UNKNOWN;
+    message->text = "nothing is known of link '" + unknown + "' on its way" +
+                    (here_.status_text.empty() ? "" : ": " + here_.status_text);
+  } else if (contact == kInfinity) {
+    message->state = Message::CLEAR;
+    message->text = format_text("no link comes nearer than %.3f m", message->lower_bound);
+  } else {
+    fill_contact(first, contact, now, message);
+  }
+}
+
+// @param link  that touches first, as ~proximity counts
+void TrajectoryWatch::fill_contact(std::size_t link, double contact, double now, Message* message) {
+  message->state = Message::CONTACT;
+  message->contact = after(trajectory_.start, contact);
+  message->time_to_contact = (message->contact - message->header.stamp).toSec();
+  message->text = format_text("link '%s' may touch an obstacle in %.2f s",
+                              model_->links[link].c_str(), message->time_to_contact);
+  const double deceleration = config_.trajectory.deceleration;
+  if (deceleration > 0.0) {
+    const double brake = trajectory_.latest_brake(now, contact, deceleration);
+    message->brake = after(trajectory_.start, brake);
+    message->text +=
+        format_text("; braking is due in %.2f s", (message->brake - message->header.stamp).toSec());
+  }
+  LiveConfig live = live_();
+  live.query.deadline = 0.0;
+  ist_proximity::ProximityArray there;
+  const auto state = trajectory_.state(*model_->kinematics, contact);
+  if (stated_.run(state, live, &there).empty() && link < there.links.size()) {
+    message->first = there.links[link];
+  }
+}
+
+void TrajectoryWatch::publish(Message* message, std::uint8_t state, const std::string& text) {
+  message->state = state;
+  message->text = text;
+  const bool is_known = state == Message::CLEAR || state == Message::CONTACT;
+  if (!is_known) message->lower_bound = kNaN;
+  if (state != Message::CONTACT) {
+    message->time_to_contact = state == Message::CLEAR ? kInfinity : kNaN;
+  }
+  last_look_ = Clock::now();
+  is_unknown_ = state == Message::UNKNOWN;
+  // Without a deceleration a contact is told, and nobody knows when braking is due.
+  brake_ = state == Message::CONTACT ? message->brake : ros::Time();
+  publish_message(publisher_, *message);
+  cancel_when_due(message->header.stamp);
+}
+
+void TrajectoryWatch::cancel_when_due(const ros::Time& now) {
+  if (!cancel_ || !is_watching_) return;
+  const bool is_due = !brake_.isZero() && now + ros::Duration(kAhead) >= brake_;
+  // The first joint states are still on their way.
+  const bool is_starting = Clock::now() - listening_since_ < kStateTimeout;
+  if (!is_due && (!is_unknown_ || is_starting)) return;
+  is_unknown_ = false;  // told again with the next answer
+  brake_ = ros::Time();
+  publish_message(cancel_, actionlib_msgs::GoalID());  // an empty one stands for all goals
+}
+
+}  // namespace ist

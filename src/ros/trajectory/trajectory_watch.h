@@ -1,0 +1,92 @@
+#pragma once
+
+#include <ist_proximity/TrajectoryClearance.h>
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <sensor_msgs/JointState.h>
+#include <trajectory_msgs/JointTrajectory.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "ros/parameters/parameters.h"
+#include "ros/services/stated_cycle.h"
+#include "ros/trajectory/watched_trajectory.h"
+
+namespace ist {
+
+/// Watches the trajectory on ~trajectory that a controller follows: publishes ~trajectory_clearance
+/// with every new cloud, ten times a second at least, until the trajectory is over, and cancels the
+/// action's goals, if asked to, when braking is due or what is left is not known.
+///
+/// A message without points ends the watch. One that cannot be watched ends it too, and is told as
+/// UNKNOWN until another one comes: what is running then is not known. So is a robot that is not
+/// where the trajectory has it. Links that the trajectory does not move, and ~ignore_links, do not
+/// count. All but set_model() is called by the thread of one callback queue.
+class TrajectoryWatch {
+ public:
+  /// @param sources, buffer  outlive this
+  /// @param watch            outlives this; null with ~unknown_space free
+  /// @param live             gives the present configuration
+  TrajectoryWatch(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
+                  const ServerConfig& config, const CloudSources& sources,
+                  const TransformBuffer& buffer, UnknownSpaceWatch* watch,
+                  std::function<LiveConfig()> live);
+
+  /// Begins to receive messages by a queue, which outlives this; its thread ends first.
+  void subscribe(ros::CallbackQueue* queue);
+
+  /// Thread safe.
+  void set_model(std::shared_ptr<const ModelState> model) { stated_.set_model(std::move(model)); }
+
+  /// Goes on where something is due; to be called every 10 ms or more often.
+  void run_when_due();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using Message = ist_proximity::TrajectoryClearance;
+  struct Position {
+    double q;  ///< [rad, m]
+    Clock::time_point received;
+  };
+
+  void receive(const trajectory_msgs::JointTrajectoryConstPtr& message);
+  void receive_state(const sensor_msgs::JointStateConstPtr& message);
+  double present_position(const std::string& joint) const;
+  std::string take_trajectory();
+  std::string why_elsewhere(double time) const;
+  bool is_due(Clock::time_point now);
+  void look(const ros::Time& now, Message* message);
+  void fill(const std::vector<LinkClearance>& found, double now, Message* message);
+  void fill_contact(std::size_t link, double contact, double now, Message* message);
+  std::vector<bool> moved_links() const;
+  void publish(Message* message, std::uint8_t state, const std::string& text);
+  void cancel_when_due(const ros::Time& now);
+
+  ros::NodeHandle nh_, private_nh_;
+  const ServerConfig config_;
+  const std::function<LiveConfig()> live_;
+  StatedCycle stated_;
+  ros::Publisher publisher_, cancel_;
+  ros::Subscriber trajectories_, states_;
+  ros::WallTimer timer_;  ///< wakes the thread while a trajectory is watched
+
+  std::unordered_map<std::string, Position> positions_;
+  trajectory_msgs::JointTrajectoryConstPtr received_;  ///< null: it has been read
+  ros::Time received_time_;
+  bool is_watching_ = false;  ///< a trajectory, or one that was refused
+  std::string refusal_;       ///< why the last one is not watched; empty: it is
+  WatchedTrajectory trajectory_;
+  std::shared_ptr<const ModelState> model_;   ///< of the trajectory's joints
+  ist_proximity::ProximityArray here_;        ///< the robot where it is to be now
+  std::vector<const CloudSnapshot*> clouds_;  ///< those of the last answer
+  Clock::time_point last_look_, listening_since_;
+  ros::Time brake_;          ///< zero: not needed
+  bool is_unknown_ = false;  ///< what the last answer said
+};
+
+}  // namespace ist

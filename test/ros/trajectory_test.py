@@ -1,0 +1,292 @@
+#!/usr/bin/env python3
+"""~trajectory: first contact, clearance and cancelling, and what cannot be watched."""
+
+import subprocess
+import sys
+import threading
+import time
+import unittest
+
+import genpy.dynamic
+import numpy as np
+import proximity_testing as pt
+import rospy
+from actionlib_msgs.msg import GoalID
+from joint_states_test import ARM, joint_state
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from ist_proximity.msg import TrajectoryClearance
+
+DURATION = 4.0  # [s]
+FAR = 0.8  # [m] where the slide goes to
+POINT = 0.6  # [m] on the way of the ball, whose radius is 0.1
+TOUCH = DURATION * (POINT - pt.BALL_RADIUS) / FAR  # [s]
+
+
+def trajectory(rows, start, names=("slide",), velocities=None):
+    """rows: (time, position, ...)"""
+    message = JointTrajectory(joint_names=list(names))
+    message.header.stamp = start
+    for k, row in enumerate(rows):
+        point = JointTrajectoryPoint(positions=list(row[1:]))
+        point.time_from_start = rospy.Duration(row[0])
+        if velocities is not None:
+            point.velocities = list(velocities[k])
+        message.points.append(point)
+    return message
+
+
+GOALS = [
+    (
+        "moveit_msgs/RobotTrajectory",
+        "trajectory_msgs/JointTrajectory joint_trajectory",
+        lambda message, path: setattr(message, "joint_trajectory", path),
+    ),
+    (
+        "control_msgs/FollowJointTrajectoryActionGoal",
+        "std_msgs/Header header\nactionlib_msgs/GoalID goal_id\ncontrol_msgs/Goal goal\n%s\n"
+        "MSG: control_msgs/Goal\ntrajectory_msgs/JointTrajectory trajectory" % ("=" * 80),
+        lambda message, path: setattr(message.goal, "trajectory", path),
+    ),
+]
+
+
+def dynamic_message(kind, definition):
+    """A message of a type that is not installed, with JointTrajectory's definition below its own."""
+    parts = [definition]
+    for one in (JointTrajectory, Header, GoalID):
+        parts.append("MSG: %s\n%s" % (one._type, one._full_text))
+    text = ("\n" + "=" * 80 + "\n").join(parts)
+    return genpy.dynamic.generate_dynamic(kind, text)[kind]()
+
+
+class TrajectoryTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace, static=False)
+        self.points = np.array([[POINT, 0.0, 0.5]])
+        self.heard, self.cancelled = [], []
+        self.condition = threading.Condition()
+        self.start_time = rospy.Time.now() + rospy.Duration(1e6)
+        self.at_rest = 0.0
+
+    def tearDown(self):
+        self.world.stop()
+        self.assertEqual(self.node.stop(), 0)
+
+    def slide(self):
+        """Where the robot is: it follows its trajectory."""
+        time_now = (rospy.Time.now() - self.start_time).to_sec()
+        return FAR * min(max(time_now / DURATION, 0.0), 1.0) + self.at_rest
+
+    def start(self, **parameters):
+        parameters.update(pose_source="joint_states", self_filter=False)
+        self.node = pt.ProximityNode(self.namespace, parameters, ARM)
+        self.node.subscribe("trajectory_clearance", TrajectoryClearance, self.hear)
+        cancel = self.namespace + "/arm/cancel"
+        self.subscriber = rospy.Subscriber(
+            cancel, GoalID, lambda _: self.cancelled.append(rospy.Time.now())
+        )
+        self.sender = rospy.Publisher(self.node.name + "/trajectory", JointTrajectory, queue_size=1)
+        joints = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
+        self.world.repeat(
+            100, lambda: joints.publish(joint_state({"turn": 0.0, "slide": self.slide()}))
+        )
+        publisher = self.world.cloud_publisher
+        self.world.repeat(20, lambda: publisher.publish(pt.cloud(self.points, "base")))
+        self.node.wait_for_status(0)
+        pt.wait_until(lambda: self.sender.get_num_connections() > 0, "the node to listen")
+
+    def hear(self, message):
+        with self.condition:
+            self.heard.append(message)
+            self.condition.notify_all()
+
+    def wait(self, condition, what, begin=None):
+        """The first message from now, or from `begin` on, for which the condition holds."""
+        at = len(self.heard) if begin is None else begin
+        end = time.monotonic() + pt.TIMEOUT
+        with self.condition:
+            while True:
+                for message in self.heard[at:]:
+                    if condition(message):
+                        return message
+                self.assertLess(time.monotonic(), end, "%s; last: %s" % (what, self.heard[-1:]))
+                self.condition.wait(0.1)
+
+    def send(self, velocities=None):
+        self.start_time = rospy.Time.now() + rospy.Duration(0.3)
+        self.sender.publish(
+            trajectory([(0.0, 0.0), (DURATION, FAR)], self.start_time, velocities=velocities)
+        )
+
+    def test_contact_is_told_and_cancelled_in_time(self):
+        self.start(trajectory={"deceleration": 0.4, "cancel_topic": "arm/cancel"})
+        self.assertEqual(self.heard, [], "nobody has sent a trajectory")
+        self.send()
+        first = self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
+        self.assertEqual(first.first.link, "ball_link")
+        self.assertEqual(set(first.links), {"ball_link", "box_link"})
+        self.assertEqual(first.header.frame_id, "base")
+        self.assertEqual(first.start, self.start_time)
+        self.assertAlmostEqual((first.end - first.start).to_sec(), DURATION, places=6)
+        contact = (first.contact - first.start).to_sec()
+        self.assertLessEqual(contact, TOUCH)
+        self.assertGreater(contact, TOUCH - 0.02)
+        self.assertAlmostEqual(
+            first.time_to_contact, (first.contact - first.header.stamp).to_sec(), places=6
+        )
+        self.assertAlmostEqual(first.first.point_on_obstacle.x, POINT, places=4)
+        # It goes at 0.2 m/s, and stops within 0.5 s and 0.25 s of the trajectory.
+        self.assertAlmostEqual((first.contact - first.brake).to_sec(), 0.25, places=3)
+        # Every answer is right, until the goal is cancelled.
+        pt.wait_until(lambda: self.cancelled, "the goal to be cancelled")
+        late = (self.cancelled[0] - first.brake).to_sec()
+        self.assertGreater(late, -0.06, "too early")
+        self.assertLess(late, 0.05, "too late")
+        told = [m for m in self.heard if m.state == m.CONTACT]
+        self.assertGreater(len(told), 10)
+        for message in told:
+            left = (message.contact - message.start).to_sec()
+            self.assertTrue(TOUCH - 0.02 < left <= TOUCH, left)
+        self.assertLess(np.median([m.computation_time for m in told]), 0.1)
+
+    def test_clear_until_it_is_over(self):
+        self.points = np.array([[0.0, 0.6, 0.5]])
+        self.start()
+        self.send(velocities=[[0.0], [0.0]])
+        clear = self.wait(lambda m: m.state == m.CLEAR, "a clear way", 0)
+        self.assertEqual(clear.time_to_contact, float("inf"))
+        self.assertEqual(clear.contact, rospy.Time())
+        self.assertEqual(clear.brake, rospy.Time())
+        self.assertEqual(len(clear.links), len(clear.lower_bounds))
+        self.assertEqual(clear.lower_bound, min(clear.lower_bounds))
+        # The ball is nearest where it begins: 0.5 m. The box, 0.2 m wide to each side, later.
+        self.assertLessEqual(clear.lower_bound, 0.5)
+        self.assertGreater(clear.lower_bound, 0.7 * 0.4)
+        # A velocity of 0 at both ends makes it a cubic, which the robot of this test lags behind
+        # and runs ahead of by less than the tolerance.
+        over = self.wait(lambda m: m.state == m.NONE, "its end")
+        self.assertIn("over", over.text)
+        self.assertTrue(np.isnan(over.time_to_contact))
+        time.sleep(0.5)
+        self.assertIs(self.heard[-1], over, "no more is said")
+        after = self.heard[self.heard.index(clear) : -1]
+        self.assertEqual({m.state for m in after}, {clear.CLEAR})
+
+    def test_a_new_cloud_counts_at_once(self):
+        self.points = np.array([[0.0, 0.9, 0.5]])
+        self.start(trajectory={"obstacle_speed": 0.0})
+        self.send()
+        self.wait(lambda m: m.state == m.CLEAR, "a clear way", 0)
+        begin = rospy.Time.now()
+        self.points = np.array([[POINT, 0.0, 0.5]])
+        told = self.wait(lambda m: m.state == m.CONTACT, "the new obstacle")
+        self.assertLess((told.header.stamp - begin).to_sec(), 0.3)
+        self.points = np.array([[0.0, 0.9, 0.5]])
+        self.wait(lambda m: m.state == m.CLEAR, "that it has gone")
+
+    def test_what_cannot_be_watched_is_unknown(self):
+        self.start(trajectory={"deceleration": 1.0, "cancel_topic": "arm/cancel"})
+        soon = rospy.Time.now() + rospy.Duration(100.0)
+        nan = float("nan")
+        cases = [
+            (trajectory([(0, 0.1)], soon, ["nobody"]), "has no joint 'nobody'"),
+            (trajectory([(0, 0.1, 0.1)], soon, ["slide", "slide"]), "twice"),
+            (trajectory([(0, 0.1)], soon, []), "names no joints"),
+            (trajectory([(0, 0.1)], soon, ["to_camera"]), "no position of its own"),
+            (trajectory([(0, 0.1), (1, 0.1, 0.2)], soon), "2 positions for 1 joints"),
+            (trajectory([(0, 0.1)], soon, ["slide", "turn"]), "1 positions for 2 joints"),
+            (trajectory([(0, 0.1), (1, nan)], soon), "nan among the positions"),
+            (trajectory([(0, 0.1), (1, 1e300)], soon), "among the positions"),
+            (trajectory([(1, 0.1), (1, 0.2)], soon), "does not rise"),
+            (trajectory([(2, 0.1), (1, 0.2)], soon), "does not rise"),
+            (trajectory([(0, 0.1), (1e6, 0.2)], soon), "more than a day"),
+            (trajectory([(0, 0.1), (1, 0.2)], soon, velocities=[[0.1], []]), "the other way round"),
+            (trajectory([(0, 0.1), (1, 0.2)], soon, velocities=[[0.1], [nan]]), "velocities"),
+            (trajectory([(k, 0.1) for k in range(10001)], soon), "10001 points"),
+            (trajectory([(0, 0.5), (1, 0.6)], soon), "joint 'slide' is at"),
+        ]
+        for message, text in cases:
+            begin = len(self.heard)
+            self.cancelled.clear()
+            self.sender.publish(message)
+            told = self.wait(lambda m: text in m.text, text, begin)
+            self.assertEqual(told.state, told.UNKNOWN, text)
+            self.assertTrue(np.isnan(told.time_to_contact) and np.isnan(told.lower_bound))
+            self.wait(lambda m: text in m.text, "that it is told again")
+            pt.wait_until(lambda: self.cancelled, "what is not known to be cancelled")
+        # A good one ends it.
+        self.send()
+        self.wait(lambda m: m.state == m.CONTACT, "a contact")
+        # The robot leaves its trajectory; its joint states end; its clouds end.
+        self.at_rest = 0.2
+        told = self.wait(lambda m: m.state == m.UNKNOWN, "a robot elsewhere")
+        self.assertIn("~trajectory/tolerance", told.text)
+        self.at_rest = 0.0
+        self.wait(lambda m: m.state == m.CONTACT, "a robot that is back")
+        # A message without points ends the watch.
+        begin = len(self.heard)
+        self.sender.publish(JointTrajectory())
+        self.wait(lambda m: m.state == m.NONE, "the end of the watch", begin)
+        self.assertEqual(self.heard[-1].text, "no trajectory is watched")
+
+    def test_without_clouds_nothing_is_known(self):
+        self.start(trajectory={"tolerance": 1.0})
+        self.send()
+        self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
+        self.points = np.full((5, 3), np.nan)
+        told = self.wait(lambda m: m.state == m.UNKNOWN, "a blind camera")
+        self.assertIn("source", told.text)
+
+    def test_joints_begin_where_they_are(self):
+        """A first point that is not at time 0 is reached from the present position."""
+        self.start(trajectory={"tolerance": 1.0})
+        self.sender.publish(trajectory([(DURATION, FAR)], rospy.Time()))
+        told = self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
+        contact = (told.contact - told.start).to_sec()
+        self.assertTrue(TOUCH - 0.02 < contact <= TOUCH, contact)
+
+    def test_goals_of_controllers_and_planners(self):
+        """The bridge reads whatever definition a publisher sends."""
+        self.start(trajectory={"tolerance": 1.0})
+        bridge = subprocess.Popen(
+            [
+                pt.find_program("ist_proximity", "trajectory_bridge"),
+                "__ns:=" + self.namespace,
+                "trajectory:=proximity/trajectory",
+            ]
+        )
+        try:
+            path = trajectory([(0.0, 0.0), (DURATION, FAR)], rospy.Time())
+            for kind, definition, fill in GOALS:
+                message = dynamic_message(kind, definition)
+                publisher = rospy.Publisher(self.namespace + "/goal", type(message), queue_size=1)
+                pt.wait_until(lambda: publisher.get_num_connections() > 0, "the bridge")
+                fill(message, path)
+                begin = len(self.heard)
+                publisher.publish(message)
+                self.wait(lambda m: m.state == m.CONTACT, kind, begin)
+                cancel = rospy.Publisher(self.namespace + "/cancel", GoalID, queue_size=1)
+                pt.wait_until(lambda: cancel.get_num_connections() > 0, "the bridge")
+                begin = len(self.heard)
+                cancel.publish(GoalID())
+                self.wait(lambda m: m.state == m.NONE, "the end of " + kind, begin)
+                publisher.unregister()
+            message = dynamic_message("other_msgs/Thing", "int32 number")
+            publisher = rospy.Publisher(self.namespace + "/goal", type(message), queue_size=1)
+            pt.wait_until(lambda: publisher.get_num_connections() > 0, "the bridge")
+            publisher.publish(message)
+            self.wait(lambda m: m.state == m.UNKNOWN, "a goal that cannot be read")
+        finally:
+            bridge.terminate()
+            bridge.wait()
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("trajectory_test")
+    rostest.rosrun("ist_proximity", "trajectory", TrajectoryTest, sys.argv)
