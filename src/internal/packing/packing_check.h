@@ -28,9 +28,9 @@ namespace ist {
 std::string packing_fault(const Shape& shape, const PackingConfig& config, const Packing& packing,
                           const PackingProgress& progress = {});
 
-/// [m] A gap that is proven as PackingCertificate::interior_gap is, and mostly smaller: packing aims
-/// at no smaller one than the surface's. Tries halves of the certificate's, and takes as long as
-/// packing. Thread safe.
+/// [m] A gap that is proven as PackingCertificate::interior_gap is, and mostly smaller: packing
+/// aims at no smaller one than the surface's. Tries halves of the certificate's, and takes as long
+/// as packing. Thread safe.
 /// @param packing  covers the shape's surface; spheres of other shapes may be among it
 double tight_interior_gap(const Shape& shape, const PackingConfig& config, const Packing& packing);
 
