@@ -50,8 +50,8 @@ class BoxSearch {
   double upper_bound() const { return upper_bound_; }
   const BoxDistance& best() const { return best_; }
 
-  // A point of which the closest point is thought to be near: the box is behind the plane across
-  // the way from there, wherever that is.
+  // Takes a place that the mesh's closest point may be near. The box is behind the plane across the
+  // way from there, so that bounds hold wherever the place is.
   void expect_near(const Eigen::Vector3d& p_O) {
     const Eigen::Vector3d p_OB = clamp_to(box_O_, p_O);
     const double distance = (p_OB - p_O).norm();
@@ -74,8 +74,8 @@ class BoxSearch {
   }
 
  private:
-  // The closest point of the box to another one has a plane, across the way from there, behind
-  // which the whole box is.
+  // The plane through the box's closest point to some other point, across the way from there, has
+  // the whole box behind it.
   void separate(const Eigen::Vector3d& normal_O, const Eigen::Vector3d& p_OB) {
     normal_M_ = X_OM_.linear().transpose() * normal_O;
     offset_M_ = normal_O.dot(p_OB - X_OM_.translation());

@@ -16,7 +16,7 @@ namespace {
 
 using Kind = ConvexPart::Kind;
 
-// Parts of a node that are divided in some milliseconds.
+// Dividing a node of so many parts takes some milliseconds.
 constexpr std::uint32_t kAskFrom = 4096;
 // The children of nodes of so many levels have hulls of at most so many points, where they hold so
 // many triangles; or a round part, which takes more points.
@@ -54,7 +54,7 @@ std::vector<ConvexPart> parts_of(const Solid& solid) {
   return parts;
 }
 
-// Unit vectors u, v, n from a direction n and one that v is to lie across.
+// The axes u, v, n about a direction n: v is across it and across a second one.
 Eigen::Matrix3d frame_about(const Eigen::Vector3d& n, const Eigen::Vector3d& along) {
   Eigen::Matrix3d frame;
   frame.col(2) = n.normalized();

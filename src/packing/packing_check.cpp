@@ -194,7 +194,7 @@ std::string packing_fault(const Shape& shape, const PackingConfig& config, const
     if (packed.mesh.triangles.empty()) return "its shape has no triangle";
     fault = PackingCheck(packed, config, packing, &watch).run();
   } catch (const Cancelled&) {
-    // The watch knows it.
+    // The watch knows that it was cancelled.
   }
   return watch.stopped() ? "its check was cancelled" : fault;
 }

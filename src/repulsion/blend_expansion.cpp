@@ -9,7 +9,7 @@
 namespace ist {
 namespace {
 
-// What the slopes of neighbours that are taken for one point may miss, as a share.
+// The slopes of neighbours that are taken for one point may be off by this share.
 constexpr float kSlopeError = 0.2F;
 
 using BySphereMap = Eigen::Map<const Eigen::Array<float, static_cast<int>(kCoarseSpheres), 1>>;

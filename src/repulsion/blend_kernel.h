@@ -40,8 +40,8 @@ struct alignas(64) NearestPoints {
   BySphere offset[3];  ///< [m] from the point to the sphere's centre
 };
 
-/// What a blend is made of, and how that changes as the spheres move. d is a pair's distance, w'
-/// the derivative of its weight by d.
+/// The sums that a blend is made of, and their slopes as the spheres move. d is a pair's distance,
+/// w' the derivative of its weight by d.
 struct alignas(64) SphereSums {
   BySphere force[3];  ///< of w n
   BySphere weight;    ///< of w

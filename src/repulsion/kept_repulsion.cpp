@@ -8,7 +8,7 @@
 namespace ist {
 namespace {
 
-// obstacles_key(), and where maps are: those of a robot that drives are placed anew in every cycle.
+// Maps are in the key by their places, too: for a robot that drives they are placed in every cycle.
 std::uint64_t placed_obstacles_key(SnapshotSpan clouds) {
   std::uint64_t key = obstacles_key(clouds);
   for (const CloudSnapshot* cloud : clouds) {

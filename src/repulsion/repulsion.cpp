@@ -16,8 +16,8 @@
 namespace ist {
 namespace {
 
-// Of the smoothing: for an expansion, the nearest points of spheres are found that are this much
-// farther than the nearest pair. A sphere that is farther does not become the nearest one while
+// A share of the smoothing: an expansion needs the nearest points of those spheres that are at most
+// this much farther than the nearest pair. Another sphere does not become the nearest one while
 // spheres move by half of this, KeptRepulsion::kMostKeptMotion.
 constexpr auto kSlack = static_cast<float>(2.0 * KeptRepulsion::kMostKeptMotion);
 

@@ -42,7 +42,7 @@ class AnytimeModel::Step {
   /// pending.
   /// @returns false where none is begun that was not before
   bool begin_links(double share);
-  /// Of all steps, this one is the part from `begin` to `end`.
+  /// Progress of this step goes from `begin` to `end` of the whole.
   void set_progress(double begin, double end) {
     progress_begin_ = begin;
     progress_end_ = end;

@@ -75,7 +75,7 @@ Drawing draw(const LinkDescription& link, const JointOfChild& joints) {
   return drawing;
 }
 
-// What takes no time to find out.
+// The conditions that take no time to check.
 bool may_enclose(const Drawing& hull, const Drawing& link) {
   return hull.triangles <= link.triangles && hull.box_T.intersects(link.box_T) &&
          hull.box.sizes().norm() > 0.0 &&

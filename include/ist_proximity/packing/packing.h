@@ -8,14 +8,13 @@ namespace ist {
 
 /// The choice of a packing's spheres and their order.
 enum class PackingOrder {
-  /// Spheres near the medial axis that may overlap, where the gap is largest first. Takes the
-  /// fewest
-  /// spheres for a given error.
+  /// Spheres near the medial axis that may overlap, where the gap is largest first. This takes the
+  /// fewest spheres for a given error.
   kMedial,
   /// The same without overlap, so that no volume counts twice (contact volumes).
   kDisjoint,
   /// The largest sphere that still fits first, without overlap: the ProtoSphere packing (Weller
-  /// 2013, chapter 5). Fills volume soonest and thin parts last.
+  /// 2013, chapter 5). It fills volume soonest and thin parts last.
   kVolume,
 };
 

@@ -33,9 +33,9 @@ class KeptRepulsion {
   KeptRepulsion(KeptRepulsion&&) noexcept;
   KeptRepulsion& operator=(KeptRepulsion&&) noexcept;
 
+  /// The arguments are those of Repulsion::wrench(). Allocates nothing.
   /// @param end  when a new blend has to end
-  /// The others are as for Repulsion::wrench().
-  /// @returns as Repulsion::wrench(). Allocates nothing
+  /// @returns as Repulsion::wrench()
   RepulsiveWrench update(const Repulsion& repulsion, const Eigen::Isometry3d& X_FL,
                          SnapshotSpan clouds, const LinkProximity& proximity,
                          const RepulsionConfig& config, TimePoint end = TimePoint::max());

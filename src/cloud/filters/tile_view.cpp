@@ -76,7 +76,7 @@ void TileView::cast(const Bundle& bundle, std::uint32_t rays) {
     if ((rays >> k & 1U) == 0) continue;
     Sight& sight = sights_[k];
     const double apart = std::abs(hits[k].t - range_[k]), known = std::abs(sight.t - range_[k]);
-    // Where two surfaces are equally near, it is the first link's, in whatever order they come.
+    // The first link's counts of two surfaces that are equally near, in whatever order they come.
     const bool is_first =
         apart == known && sight.link != nullptr && bundle.link->number < sight.link->number;
     if (!(apart < known || is_first)) continue;

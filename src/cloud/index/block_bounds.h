@@ -31,7 +31,7 @@ constexpr float kBoxError = 12.0F / (1 << 24);
 /// widened by the rounding, and range limits come in pairs that leave room for it.
 struct BlockTransform {
   explicit BlockTransform(const CropParameters& crop);
-  /// The same for pixels of which all that are numbers are known to be kept.
+  /// The same where every pixel that is no NaN is known to be kept.
   BlockTransform without_limits() const;
 
   float R[9];         ///< rotation of X_OS, row-major

@@ -10,7 +10,7 @@ namespace {
 
 // [m/s] Few links of arms move faster.
 constexpr double kSpeed = 2.0;
-// [m] What a link may move until the next cloud comes: at least, and where that is not known.
+// [m] Limits of a link's motion until the next cloud; the larger one where the time is not known.
 constexpr double kLeastMotion = 0.1, kMostMotion = 1.0;
 
 }  // namespace

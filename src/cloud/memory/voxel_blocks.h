@@ -55,12 +55,12 @@ inline unsigned place_in_block(const VoxelKey& key) {
 struct VoxelBlock {
   std::uint64_t id = 0;
   std::uint32_t frame = 0;   ///< the cloud that the bits below `known` are about
-  std::uint32_t oldest = 0;  ///< [ms] no voxel's time is before
-  std::uint32_t newest = 0;  ///< [ms] no voxel's time is after
+  std::uint32_t oldest = 0;  ///< [ticks of VoxelMap] no voxel's time is before
+  std::uint32_t newest = 0;  ///< [ticks of VoxelMap] no voxel's time is after
   BlockBits known{}, occupied{};
   BlockBits hit{}, free{}, shaded{};  ///< by one cloud: ends of rays, rays, and just behind ends
   std::array<float, kBlockVoxels> log_odds;      ///< NaN: unknown
-  std::array<std::uint32_t, kBlockVoxels> time;  ///< [ms] of the measurement; undefined: unknown
+  std::array<std::uint32_t, kBlockVoxels> time;  ///< [ticks] of the measurement; undefined: unknown
 };
 
 /// The blocks of a map, found by their number in an open-addressing hash table. Blocks keep their

@@ -15,7 +15,7 @@ constexpr double kTick = 0.01;  // [s] of VoxelBlock's times: 32 bits last for 4
 constexpr double kMaxTicks = 4e9;
 // One in so many blocks is forgotten when memory is short, at least.
 constexpr std::size_t kForgottenShare = 8;
-// [voxels] from the end of a ray on: what lies behind a point is answered by that point.
+// [voxels] The end of a ray answers for places that lie so far behind it.
 constexpr double kShade[] = {0.5, 1.0};
 
 float log_odds_of(double probability) {

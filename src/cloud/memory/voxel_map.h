@@ -82,7 +82,7 @@ class VoxelMap {
   std::size_t forgotten_ = 0, skipped_ = 0, lost_ = 0;
   std::size_t added_ = 0;  ///< blocks that the last cloud added
 
-  // Of the cloud that is inserted.
+  // The members below are about the cloud that is inserted.
   std::vector<VoxelBlock*> touched_;  ///< blocks whose bits are of this cloud
   KeySet ends_seen_;
   std::vector<RayEnd> ray_ends_;

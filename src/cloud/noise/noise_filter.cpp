@@ -31,7 +31,7 @@ bool is_within(const Eigen::Vector3d& p, double range) {
   return p.squaredNorm() <= limit * limit;
 }
 
-// [m^2] from a point to a child's box.
+// [m^2] The squared distance from a point to a child's box.
 float distance_sq(const BoxNode& node, int child, const Eigen::Vector3f& p) {
   const float x = std::max({node.min_x[child] - p.x(), p.x() - node.max_x[child], 0.0F});
   const float y = std::max({node.min_y[child] - p.y(), p.y() - node.max_y[child], 0.0F});

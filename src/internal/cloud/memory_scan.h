@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// What a cloud says of space. Points that are in the snapshot are obstacles. Rays are free up to
+/// Reads what a cloud sees. Points that are in the snapshot are obstacles. Rays are free up to
 /// the other points in range, which are on the robot or outside the region of interest, and up to
 /// `max_range` where a point is farther or, in a depth image, nothing is in range. A pixel or point
 /// of which nothing is known (NaN), nearer than `min_range`, or farther than is believed, says

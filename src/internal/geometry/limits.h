@@ -24,7 +24,7 @@ constexpr std::size_t kMaxMeshFileSize = std::size_t{256} << 20U;
 constexpr std::size_t kMaxTriangles = 2000000;
 
 /// The text of a URDF [bytes]; its links, and as many joints; the collision or visual elements that
-/// are read; the bytes of a name. Robots have up to some hundred links. A query holds 200 kB for
+/// are read; the bytes of a name. Robots have up to some hundred links. A query holds 100 kB for
 /// each link with geometry.
 constexpr std::size_t kMaxDescriptionSize = std::size_t{64} << 20U;
 constexpr std::size_t kMaxLinks = 5000;
