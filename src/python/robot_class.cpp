@@ -243,6 +243,67 @@ Distances distances_at(const Robot& robot, const DoubleArray& poses, const PyObs
   return to_arrays(answers, shape);
 }
 
+/// Rows of trajectory k out of an array (n, joints) or (m, n, joints); none for an empty array.
+std::vector<std::vector<double>> rows_of(const DoubleArray& array, std::size_t k, std::size_t n,
+                                         std::size_t joints) {
+  std::vector<std::vector<double>> rows;
+  if (array.size() == 0) return rows;
+  const double* first = array.data() + k * n * joints;
+  for (std::size_t i = 0; i < n; ++i)
+    rows.emplace_back(first + i * joints, first + (i + 1) * joints);
+  return rows;
+}
+
+py::dict clearance(const Robot& robot, const DoubleArray& times, const DoubleArray& positions,
+                   const PyObstacles& obstacles, const DoubleArray& velocities,
+                   const DoubleArray& accelerations, double max_distance, double margin,
+                   int threads) {
+  const bool is_many = positions.ndim() == 3;
+  const auto joints = static_cast<py::ssize_t>(robot.joints().size());
+  check_shape(positions, is_many ? 3 : 2, joints,
+              "positions have the shape (n, joints) or (m, n, joints)");
+  const py::ssize_t n = positions.shape(is_many ? 1 : 0), m = is_many ? positions.shape(0) : 1;
+  for (const DoubleArray* one : {&velocities, &accelerations}) {
+    if (one->size() != 0 && one->size() != positions.size()) {
+      throw py::value_error("velocities and accelerations have the shape of the positions");
+    }
+  }
+  const bool fits = times.ndim() == 1
+                        ? times.shape(0) == n
+                        : times.ndim() == 2 && times.shape(0) == m && times.shape(1) == n;
+  if (!fits) {
+    throw py::value_error("times have the shape (n,) or (m, n); an array of shape " +
+                          to_string(times) + " was given");
+  }
+  std::vector<JointTrajectory> trajectories;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(m); ++k) {
+    const auto rows = static_cast<std::size_t>(n), columns = static_cast<std::size_t>(joints);
+    const double* first = times.data() + (times.ndim() == 2 ? k * rows : 0);
+    trajectories.push_back({{first, first + rows},
+                            rows_of(positions, k, rows, columns),
+                            rows_of(velocities, k, rows, columns),
+                            rows_of(accelerations, k, rows, columns)});
+  }
+  const BatchConfig config = batch_config(max_distance, 0.0, margin, 0.0, 0.0, threads);
+  std::vector<LinkClearance> answers;
+  {
+    const Obstacles& points = obstacles.obstacles;
+    const py::gil_scoped_release unlocked;
+    answers = robot.clearance(trajectories, points, config);
+  }
+  Shape shape;
+  if (is_many) shape.push_back(m);
+  shape.push_back(static_cast<py::ssize_t>(robot.links().size()));
+  const auto array = [&](double LinkClearance::*number) {
+    return make_array<double>(shape, [&](std::size_t i) { return answers[i].*number; });
+  };
+  py::dict result;
+  result["contact_time"] = array(&LinkClearance::contact_time);
+  result["lower_bound"] = array(&LinkClearance::lower_bound);
+  result["nearest_time"] = array(&LinkClearance::nearest_time);
+  return result;
+}
+
 py::object link_poses(const Robot& robot, const py::object& q) {
   const Configurations configurations(robot, q);
   const Span<const double> values = configurations.values();
@@ -352,6 +413,20 @@ void define_robot(py::module_* module) {
                           "nan is UNKNOWN.")
                    .c_str(),
                py::arg("poses"));
+  const QueryConfig query;
+  const DoubleArray none(0);
+  type.def("clearance", &clearance, py::arg("times"), py::arg("positions"), py::arg("obstacles"),
+           py::kw_only(), py::arg("velocities") = none, py::arg("accelerations") = none,
+           py::arg("max_distance") = query.max_distance, py::arg("margin") = query.margin,
+           py::arg("threads") = 0,
+           R"(First contacts and clearances along trajectories, among obstacles that stand still.
+
+times: (n,) or (m, n) [s], rising. positions: (n, joints) or (m, n, joints) [rad, m]; mimic joints follow.
+velocities, accelerations: like positions, or none. Joints move straight between positions, along cubic polynomials
+with velocities, along quintic ones with accelerations too.
+Returns a dictionary of arrays (links,) or (m, links): contact_time [s], never later than the first contact, inf without
+one, nan where it is not known; lower_bound [m] of the distance until the end or that time, at most the least distance and
+less by a quarter of it or 2 mm; nearest_time [s] of the least bound found.)");
   define_measures(&type);
 }
 

@@ -92,3 +92,32 @@ def test_wrong_values_stop_the_robot_and_wrong_settings_raise(robot, obstacles):
         ist.constraint_rows(robot, q[:-1], distances)
     with pytest.raises(ValueError, match='upper'):
         ist.VelocityFilter([1.0], lower=[1.0], upper=[0.0])
+
+
+def test_trajectories_are_clear_until_they_touch(robot, obstacles):
+    rng = np.random.default_rng(7)
+    times = np.array([0.0, 0.8, 2.0])
+    positions = rng.uniform(-1.0, 1.0, (20, 3, len(robot.joints)))
+    found = robot.clearance(times, positions, obstacles)
+    alone = robot.clearance(times, positions[3], obstacles, threads=1)
+    assert np.array_equal(alone['contact_time'], found['contact_time'][3])
+    contacts = 0
+    for k, path in enumerate(positions):
+        samples = np.linspace(0.0, 2.0, 400)
+        q = np.stack([np.interp(samples, times, path[:, j]) for j in range(path.shape[1])], axis=1)
+        distance = robot.distances(q, obstacles, tolerance=0.0).distance
+        for link in range(len(robot.links)):
+            touches = np.flatnonzero(distance[:, link] <= 0.0)
+            first = samples[touches[0]] if len(touches) else np.inf
+            contacts += len(touches) > 0
+            assert found['contact_time'][k, link] <= first
+            before = samples <= found['contact_time'][k, link]
+            assert found['lower_bound'][k, link] <= distance[before, link].min(initial=1.0) + 1e-9
+    assert 0 < contacts < 20 * len(robot.links)
+    smooth = robot.clearance(times, positions, obstacles, velocities=np.zeros_like(positions))
+    assert smooth['contact_time'].shape == found['contact_time'].shape
+    for wrong, text in [((times[::-1], positions), 'rise'), ((times[:2], positions), 'times'),
+                        ((times, positions[..., 1:]), 'joints'),
+                        ((times, np.full_like(positions, np.nan)), 'finite')]:
+        with pytest.raises(ValueError, match=text):
+            robot.clearance(*wrong, obstacles)

@@ -8,6 +8,7 @@
 
 #include "ist_proximity/facade/obstacles.h"
 #include "ist_proximity/geometry/span.h"
+#include "ist_proximity/proximity/joint_trajectory.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "ist_proximity/robot/robot_model.h"
@@ -111,6 +112,15 @@ class Robot {
   std::vector<LinkProximity> distances_at(Span<const Eigen::Isometry3d> X_FL,
                                           const Obstacles& obstacles,
                                           const BatchConfig& config = {}) const;
+
+  /// First contacts and clearances along trajectories, on many threads; the obstacles stand still.
+  /// @param trajectories  by joint of joints(); mimic joints follow
+  /// @returns as many times the number of links, in the order of the trajectories
+  /// @throws std::invalid_argument when sizes differ, times do not rise, numbers are not finite, or
+  ///         as distances()
+  std::vector<LinkClearance> clearance(Span<const JointTrajectory> trajectories,
+                                       const Obstacles& obstacles,
+                                       const BatchConfig& config = {}) const;
 
   const RobotDescription& description() const;                  ///< what the URDF states
   const std::shared_ptr<const RobotModel>& model() const;       ///< the packed links
