@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "ist_proximity/facade/robot.h"
 #include "ist_proximity/proximity/joint_trajectory.h"
 #include "ist_proximity/proximity/time_of_impact.h"
 #include "support/motions.h"
@@ -68,7 +69,8 @@ Scene random_scene(test::Rng* rng, const test::Arm& arm) {
     std::vector<double> velocity, acceleration;
     for (std::size_t j = 0; j < at.size(); ++j) {
       const double way = joints[j].type == JointType::kPrismatic ? 0.2 : 1.0;
-      if (k > 0 && !std::isnan(start[j])) at[j] += test::uniform(rng, -way, way);
+      const bool pauses = k > 1 && test::uniform(rng, 0, 1) < 0.3;
+      if (k > 0 && !pauses && !std::isnan(start[j])) at[j] += test::uniform(rng, -way, way);
       const bool is_end = k == 0 || k + 1 == count;
       velocity.push_back(is_end ? 0.0 : test::uniform(rng, -way, way));
       acceleration.push_back(is_end ? 0.0 : 3.0 * test::uniform(rng, -way, way));
@@ -155,12 +157,21 @@ TEST(TrajectoryClearance, neverLateAndHardlyEarly) {
                   std::vector<bool>(arm.size(), true), {&cloud}, {}, 0.0, 0.0, &found);
       LinkClearance all;
       all.contact_time = kInf;
+      double earliest = kInf;
       for (const LinkClearance& one : found) {
         ASSERT_FALSE(std::isnan(one.contact_time));
         all.contact_time = std::min(all.contact_time, one.contact_time);
         all.lower_bound = std::fmin(all.lower_bound, one.lower_bound);
       }
       const Sampled truth = sample(arm, scene, from);
+      // Pieces that are far from the polynomials are early, and not wrong.
+      std::vector<LinkClearance> coarse;
+      impacts.run(straight_pieces(scene.path, 0.1), from, scene.motion.still, scene.motion.X_FR,
+                  std::vector<bool>(arm.size(), true), {&cloud}, {}, 0.0, 0.0, &coarse);
+      for (const LinkClearance& one : coarse) {
+        earliest = std::min(earliest, one.contact_time);
+      }
+      ASSERT_LE(earliest, truth.contact) << "late";
       ASSERT_LE(all.contact_time, truth.contact) << "late";
       const double until =
           all.contact_time < kInf
@@ -217,6 +228,39 @@ TEST(TrajectoryClearance, obstaclesThatComeNearer) {
   for (const LinkClearance& one : found) first = std::min(first, one.contact_time);
   EXPECT_NEAR(first, from + distance / speed - age, 0.01);
   EXPECT_LE(first, from + distance / speed - age);
+}
+
+// One piece, whose chord stands still: all of the motion is deviation, of the joint that follows
+// too.
+TEST(TrajectoryClearance, jointsThatFollowLeaveTheChord) {
+  const Robot robot(R"(<robot name="two"><link name="base"/>
+    <link name="led"/><link name="ball"><collision><geometry><sphere radius="0.1"/></geometry>
+    </collision></link>
+    <joint name="lead" type="prismatic"><parent link="base"/><child link="led"/><axis xyz="1 0 0"/>
+      <limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+    <joint name="follow" type="prismatic"><parent link="base"/><child link="ball"/>
+      <axis xyz="1 0 0"/><limit lower="-3" upper="3" velocity="1" effort="1"/>
+      <mimic joint="lead" multiplier="-3"/></joint></robot>)");
+  JointTrajectory path;
+  path.times = {0.0, 1.0};
+  path.positions.assign(2, std::vector<double>(2, std::nan("")));
+  path.velocities = path.positions;
+  const std::size_t lead = *robot.kinematics()->find_joint("lead");
+  path.positions[0][lead] = path.positions[1][lead] = 0.0;
+  path.velocities[0][lead] = 1.0;  // 0.25 m at half the time
+  path.velocities[1][lead] = -1.0;
+  JointPoses still;
+  robot.kinematics()->place_joints(path.positions[0], &still);
+  const CloudSnapshot cloud = test::make_snapshot({Eigen::Vector3d(-0.7, 0.0, 0.0)});
+  TimeOfImpact impacts(robot.model(), robot.kinematics(), QueryConfig());
+  for (const double deviation : {10.0, 1e-3}) {
+    std::vector<LinkClearance> found;
+    impacts.run(straight_pieces(path, deviation), 0.0, still, Eigen::Isometry3d::Identity(), {true},
+                {&cloud}, {}, 0.0, 0.0, &found);
+    const double touch = 0.5 - std::sqrt(0.25 - 0.2);  // 3 t (1 - t) is 0.6
+    EXPECT_LE(found[0].contact_time, touch);
+    EXPECT_GE(found[0].contact_time, deviation < 1.0 ? touch - 0.02 : 0.0);
+  }
 }
 
 TEST(TrajectoryClearance, whatIsNotKnownIsNotFree) {
