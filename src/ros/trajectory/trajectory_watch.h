@@ -59,7 +59,6 @@ class TrajectoryWatch {
   double present_position(const std::string& joint) const;
   std::string take_trajectory();
   std::string why_elsewhere(double time) const;
-  bool is_due(Clock::time_point now);
   void look(const ros::Time& now, Message* message);
   void fill(const std::vector<LinkClearance>& found, double now, Message* message);
   void fill_contact(std::size_t link, double contact, double now, Message* message);
