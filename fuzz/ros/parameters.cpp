@@ -2,10 +2,12 @@
 // is said.
 //
 // Covers: src/ros/parameters/parameters.cpp src/ros/parameters/parameter_reader.cpp
-// Covers: src/ros/parameters/source_parameters.cpp src/ros/common/text.cpp
+// Covers: src/ros/parameters/source_parameters.cpp src/ros/parameters/parameter_table.cpp
+// Covers: src/ros/common/text.cpp
 // Longest input: 400
 
 #include "ros/parameters/parameters.h"
+#include "ros/parameters/parameter_table.h"
 
 #include <cmath>
 #include <cstddef>
@@ -33,7 +35,6 @@ std::string name(ByteReader* in) {
                                        "influence_distance",
                                        "gain",
                                        "smoothing",
-                                       "filter_time",
                                        "packing",
                                        "max_error",
                                        "max_spheres",
@@ -170,18 +171,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     FUZZ_CHECK(error.what()[0] == '~', "no parameter named: %s", error.what());
   }
   // What the tree lacks, or has wrong, keeps the last value.
-  ist::LiveConfig last;
+  ist::ServerConfig last;
   last.query.margin = 0.05;
   ist::LiveReading live = ist::parse_live(tree, last);
   check_query(live.config.query);
   check_repulsion(live.config.repulsion, last.query.max_distance);
-  const std::vector<ist::Parameter> table = ist::live_parameters(&live.config);
-  FUZZ_CHECK(live.found.size() == table.size(), "%zu rows", table.size());
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    const ist::Parameter& one = table[i];
+  for (const ist::Parameter& one : ist::live_parameters(&live.config)) {
     FUZZ_CHECK(one.is_bool() || one.range.contains(one.number()), "%s is %g", one.name.c_str(),
                one.number());
-    FUZZ_CHECK(one.name != "query/margin" || live.found[i] || one.number() == 0.05,
+    FUZZ_CHECK(one.name != "query/margin" || live.found.count(one.name) > 0 || one.number() == 0.05,
                "the margin was lost: %g", one.number());
   }
   return 0;

@@ -216,13 +216,13 @@ class DepthImageTest(unittest.TestCase):
     def test_extent(self):
         """Noise, footprint and latency: the bound is that of a sphere about each point."""
         self.start(
-            noise={"a": 0.001, "b": 0.004, "k": 2, "calibration": 0.003},
+            noise={"a": 0.001, "b": 0.004, "calibration": 0.003},
             footprint="camera",
-            latency={"time": 0.02, "speed": 0.5},
+            latency=0.02,
         )
         self.check_wall()  # the distance stays that of the nearest point
         seen = pt.apply(X_BASE_CAMERA, points(depths()))
-        radius = self.radius(seen, 2, 0.001, 0.004, 0.003, 0.01)
+        radius = self.radius(seen, 3, 0.001, 0.004, 0.003, 0.02 * 1.6)
         self.assertGreater(radius.min(), 0.02)
         with self.stream(lambda: image(depths())):
             answer = self.node.wait_for_status(ProximityArray.OK)

@@ -69,17 +69,12 @@ class ReconfigureTest(unittest.TestCase):
                 "influence_distance": 0.6,  # ~max_distance
                 "gain": 5.0,
                 "smoothing": 0.5,
-                "filter_time": 1.0,
             },
             "penetration": {"stiffness": 1e6},
             "speed_scale": {
                 "stop_distance": 0.6,
                 "free_distance": 0.6,
                 "hysteresis": 0.1,
-                "slow_distance": 0.6,
-                "slow_scale": 1.0,
-                "self_stop_distance": 0.6,
-                "self_free_distance": 0.6,
             },
             "speed_scale/separation": {
                 "enabled": True,
@@ -88,7 +83,6 @@ class ReconfigureTest(unittest.TestCase):
                 "reaction_time": 2.0,
                 "stopping_time": 2.0,
                 "intrusion": 1.0,
-                "uncertainty": 0.5,
             },
         }
         least = {"deadline": -1.0, "robot_speed": 0.001, "enabled": False}
@@ -179,9 +173,8 @@ class ReconfigureTest(unittest.TestCase):
         separation.update_configuration({"enabled": True, "stopping_time": 0.1})
         self.node.wait_until(lambda: scales[-1] == 0.0, "a walking person 0.18 m away")
         rospy.set_param(name + "/links", {"ball_link": {"stop_distance": 0.01}})
-        self.node.wait_until(
-            lambda: "was not set at the start: restart the node" in self.node.log(), "a word on it"
-        )
+        words = "has to be restarted: ~speed_scale/links/ball_link/stop_distance has been set to 0.01"
+        self.node.wait_until(lambda: words in self.node.log(), words)
 
     def margin_stays(self, words, margin):
         """The ball's lower bound stays that of the margin for two readings of the server."""

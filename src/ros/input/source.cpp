@@ -28,7 +28,7 @@ SourceReport report_of(const SourceConfig& config, const std::string& place) {
   report.timeout_parameter = config.timeout_parameter;
   report.required = config.required;
   report.measures = !is_world && !config.is_permanent();
-  report.min_measured = config.min_measured;
+  report.min_measured = kMinMeasured;
   report.frozen_after = config.frozen_after;
   report.sensor_range = std::max(config.ingest.sensor_range, config.ingest.max_range);
   if (config.ingest.self_filter) report.blind_skin = config.ingest.self_filter_padding;
@@ -208,9 +208,8 @@ void Source::notice_clock_jump() {
 std::string doubt_of_view(const ViewReport& view) {
   if (!view.is_used || !view.has_drifted) return "";
   return format_text("its points on the robot are %.1f mm off, ", 1e3 * view.offset) +
-         "more than three times what self_filter_view/position_error and angle_error say: "
-         "calibrate "
-         "the sensor; until then its self-filter drops all that is within the padding";
+         "more than three times what is usual for a sensor's pose: calibrate the sensor; until "
+         "then its self-filter drops all that is within the padding";
 }
 
 }  // namespace ist

@@ -226,7 +226,7 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
            " is not remembered: the pose of link '" + link.name +
            "' was not known, and the robot itself would be";
   }
-  if (!cloud.cloud.counts.saw_enough(config_.min_measured)) {
+  if (!cloud.cloud.counts.saw_enough(kMinMeasured)) {
     return "the last " + std::string(noun(config_.type)) +
            " is not remembered: too little of it was measured";
   }

@@ -6,12 +6,12 @@
 #include <ros/this_node.h>
 
 #include <algorithm>
-#include <optional>
+#include <functional>
 #include <sstream>
-#include <utility>
 
 #include "ros/common/publish.h"
 #include "ros/common/text.h"
+#include "ros/parameters/parameter_table.h"
 
 namespace ist {
 namespace {
@@ -28,31 +28,31 @@ constexpr char kKept[] =
     "the last valid ~query, ~repulsion, ~penetration and ~speed_scale stay in use: ";
 constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
 
-/// The rows of a group, by the rest of their names; those of a group below are not among them.
-std::vector<std::pair<std::string, Parameter>> rows_of(const std::string& group,
-                                                       LiveConfig* config) {
-  std::vector<std::pair<std::string, Parameter>> rows;
-  for (const Parameter& parameter : live_parameters(config)) {
-    const std::size_t slash = parameter.name.rfind('/');
-    if (parameter.name.compare(0, slash, group) != 0) continue;
-    rows.emplace_back(parameter.name.substr(slash + 1), parameter);
-  }
+/// A group is a dictionary, without the dictionaries in it.
+std::vector<Parameter> rows_of(const std::string& group, ServerConfig* config) {
+  std::vector<Parameter> rows = live_parameters(config);
+  const auto is_other = [&group](const Parameter& row) {
+    return row.name.compare(0, row.name.rfind('/'), group) != 0;
+  };
+  rows.erase(std::remove_if(rows.begin(), rows.end(), is_other), rows.end());
   return rows;
 }
 
-/// One number of each parameter of a group.
-template <class Number>
-Config config_of(const std::string& group, LiveConfig live, Number number) {
+std::string name_in_group(const Parameter& row) { return row.name.substr(row.name.rfind('/') + 1); }
+
+/// One number of each row.
+Config config_of(const std::vector<Parameter>& rows,
+                 const std::function<double(const Parameter&)>& number) {
   Config config;
-  for (const auto& [name, parameter] : rows_of(group, &live)) {
-    if (parameter.is_bool()) {
+  for (const Parameter& row : rows) {
+    if (row.is_bool()) {
       config.bools.emplace_back();
-      config.bools.back().name = name;
-      config.bools.back().value = number(parameter) != 0.0;
+      config.bools.back().name = name_in_group(row);
+      config.bools.back().value = number(row) != 0.0;
     } else {
       config.doubles.emplace_back();
-      config.doubles.back().name = name;
-      config.doubles.back().value = number(parameter);
+      config.doubles.back().name = name_in_group(row);
+      config.doubles.back().value = number(row);
     }
   }
   config.groups.emplace_back();
@@ -61,32 +61,25 @@ Config config_of(const std::string& group, LiveConfig live, Number number) {
   return config;
 }
 
-Config values_of(const std::string& group, const LiveConfig& live) {
-  return config_of(group, live, [](const Parameter& parameter) { return parameter.number(); });
-}
+double number_of(const Parameter& row) { return row.number(); }
 
-ConfigDescription describe(const std::string& group, LiveConfig defaults, const LiveConfig& live) {
-  const double max_distance = live.query.max_distance;
+/// A value that is set is not cut off.
+ConfigDescription describe(const std::vector<Parameter>& defaults,
+                           const std::vector<Parameter>& live, double max_distance) {
   ConfigDescription all;
-  all.dflt = values_of(group, defaults);
-  all.min = config_of(group, defaults, [](const Parameter& one) { return one.range.min; });
-  all.max = config_of(group, live, [max_distance](const Parameter& one) {
-    const double end = std::min(one.range.max, one.slider > 0.0 ? one.slider : max_distance);
-    return std::max(end, one.number());  // a value that is set must not be cut off
+  all.dflt = config_of(defaults, number_of);
+  all.min = config_of(defaults, [](const Parameter& row) { return row.range.min; });
+  all.max = config_of(live, [max_distance](const Parameter& row) {
+    return std::max(row.number(), row.slider > 0.0 ? row.slider : max_distance);
   });
-  for (std::size_t i = 0; i < all.max.doubles.size(); ++i) {
-    double& end = all.max.doubles[i].value;
-    end = std::max(end, all.dflt.doubles[i].value);
-  }
   all.groups.emplace_back();
   all.groups.back().name = kOnlyGroup;
-  for (const auto& [name, parameter] : rows_of(group, &defaults)) {
+  for (const Parameter& row : defaults) {
     dynamic_reconfigure::ParamDescription one;
-    one.name = name;
-    one.type = parameter.is_bool() ? "bool" : "double";
-    const std::string unit = parameter.range.unit;
-    one.description = "~" + parameter.name + (unit.empty() ? ": " : " [" + unit + "]: ");
-    one.description += parameter.help;
+    one.name = name_in_group(row);
+    one.type = row.is_bool() ? "bool" : "double";
+    const std::string unit = row.range.unit;
+    one.description = "~" + row.name + (unit.empty() ? ": " : " [" + unit + "]: ") + row.help;
     all.groups.back().parameters.push_back(one);
   }
   return all;
@@ -99,17 +92,6 @@ bool write(const std::string& name, const XmlRpcValue& value) {
   request[1] = name;
   request[2] = value;
   return ros::master::execute("setParam", request, response, payload, false);
-}
-
-std::string path_of(const std::string& group, const std::string& name) {
-  return group + "/" + name;
-}
-
-/// @param before  the value in use; null: it was not set
-std::string change_text(const std::string& name, const std::string& value,
-                        const std::string* before) {
-  if (before == nullptr) return "~" + name + " has been set to " + value;
-  return "~" + name + " is " + value + ", in use is " + *before;
 }
 
 std::string text_of(const XmlRpcValue& value) {
@@ -125,34 +107,38 @@ std::string text_of(const XmlRpcValue& value) {
 
 LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config)
     : private_nh_(private_nh), live_(config) {
-  configured_.assign(live_parameters(&live_).size(), false);
-  lost_ = configured_;
-  LiveConfig defaults;
+  ServerConfig defaults;
   defaults.query.max_distance = config.query.max_distance;
   defaults.speed_scale = fitted_to(defaults.speed_scale, config.query.max_distance);
   defaults = parse_live(XmlRpcValue(), defaults).config;  // the influence distance fits, too
   {
     const std::lock_guard<std::mutex> lock(change_mutex_);
-    for (const char* name : kGroups) advertise(name, defaults);
+    for (const char* name : kGroups) advertise(name, &defaults);
   }
   read_again();
   timer_ = private_nh_.createSteadyTimer(ros::WallDuration(1.0),
                                          [this](const ros::SteadyTimerEvent&) { read_again(); });
 }
 
-void LiveParameters::advertise(const std::string& name, const LiveConfig& defaults) {
+void LiveParameters::advertise(const std::string& name, ServerConfig* defaults) {
   groups_.push_back(std::make_unique<Group>());
   Group* group = groups_.back().get();
   group->name = name;
   ros::NodeHandle nh(private_nh_, name);
   group->descriptions = nh.advertise<ConfigDescription>("parameter_descriptions", 1, true);
-  publish_message(group->descriptions, describe(name, defaults, live_));
+  publish_message(group->descriptions, describe(rows_of(name, defaults), rows_of(name, &live_),
+                                                live_.query.max_distance));
   group->updates = nh.advertise<Config>("parameter_updates", 1, true);
   group->service = nh.advertiseService<Reconfigure::Request, Reconfigure::Response>(
       "set_parameters",
       [this, group](Reconfigure::Request& request, Reconfigure::Response& response) {
         return set(group, request.config, &response.config);
       });
+}
+
+ServerConfig LiveParameters::config() const {
+  const std::lock_guard<std::mutex> lock(live_mutex_);
+  return live_;
 }
 
 LiveConfig LiveParameters::get() const {
@@ -162,10 +148,9 @@ LiveConfig LiveParameters::get() const {
 
 std::string LiveParameters::problem() const {
   const std::lock_guard<std::mutex> lock(live_mutex_);
-  const auto waits = Clock::now() - asked_;
+  const std::chrono::duration<double> waits = Clock::now() - asked_;
   if (asked_ != Clock::time_point() && waits > kPatience) {
-    const double seconds = std::chrono::duration<double>(waits).count();
-    return kKept + format_text("the parameter server has not answered for %.0f s", seconds);
+    return kKept + format_text("the parameter server has not answered for %.0f s", waits.count());
   }
   return problem_;
 }
@@ -194,15 +179,11 @@ bool LiveParameters::read_server() {
     set_problem("the parameter server at " + ros::master::getURI() + " does not answer");
     return false;
   }
-  const LiveReading reading = parse_live(*tree, get());
-  for (std::size_t i = 0; i < lost_.size(); ++i) {
-    lost_[i] = configured_[i] && !reading.found[i];
-    configured_[i] = configured_[i] || reading.found[i];
-  }
-  take(reading.config);
+  const LiveReading reading = parse_live(*tree, config());
+  take(reading);
   note_startup_changes(*tree);
   std::vector<std::string> problems = reading.errors;
-  if (const std::string lost = lost_names(); !lost.empty()) problems.push_back(lost);
+  if (const std::string lost = lost_names(reading.found); !lost.empty()) problems.push_back(lost);
   set_problem(join(problems, "; "));
   return true;
 }
@@ -210,18 +191,18 @@ bool LiveParameters::read_server() {
 /// Says which parameters have changed, or come, that are read at the start only. What is gone from
 /// the server is not named: it is still in use. The caller holds change_mutex_.
 void LiveParameters::note_startup_changes(const XmlRpcValue& tree) {
-  std::map<std::string, XmlRpcValue> now = leaves_of(tree);
-  LiveConfig live = get();
-  for (const Parameter& parameter : live_parameters(&live)) now.erase(parameter.name);
+  Values now = leaves_of(tree);
+  ServerConfig live = config();
+  for (const Parameter& row : live_parameters(&live)) now.erase(row.name);
   if (!at_start_) at_start_ = now;
   std::vector<std::string> changes;
   for (const auto& [name, value] : now) {
     const auto before = at_start_->find(name);
     const std::string text = text_of(value);
-    const bool is_new = before == at_start_->end();
-    const std::string in_use = is_new ? "" : text_of(before->second);
-    if (is_new || in_use != text) {
-      changes.push_back(change_text(name, text, is_new ? nullptr : &in_use));
+    if (before == at_start_->end()) {
+      changes.push_back("~" + name + " has been set to " + text);
+    } else if (const std::string in_use = text_of(before->second); in_use != text) {
+      changes.push_back("~" + name + " is " + text + ", in use is " + in_use);
     }
   }
   std::string sentence = join(changes, "; ");
@@ -237,14 +218,12 @@ void LiveParameters::note_startup_changes(const XmlRpcValue& tree) {
 }
 
 /// Names the parameters that have gone from the server, with the values in use.
-std::string LiveParameters::lost_names() const {
-  LiveConfig live = get();
-  const std::vector<Parameter> table = live_parameters(&live);
+std::string LiveParameters::lost_names(const std::set<std::string>& found) const {
+  ServerConfig live = config();
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < lost_.size(); ++i) {
-    if (!lost_[i]) continue;
-    names.push_back("~" + table[i].name + " (" +
-                    with_unit(number_text(table[i].number()), table[i].range) + ")");
+  for (const Parameter& row : live_parameters(&live)) {
+    if (configured_.count(row.name) == 0 || found.count(row.name) > 0) continue;
+    names.push_back("~" + row.name + " (" + with_unit(number_text(row.number()), row.range) + ")");
   }
   if (names.empty()) return "";
   return "no longer on the parameter server: " + join(names, ", ") +
@@ -268,71 +247,66 @@ void LiveParameters::set_problem(const std::string& problem) {
   logged_problem_ = text;
 }
 
-void LiveParameters::take(const LiveConfig& config) {
+/// The caller holds change_mutex_.
+void LiveParameters::take(const LiveReading& reading) {
+  configured_.insert(reading.found.begin(), reading.found.end());
   const std::lock_guard<std::mutex> lock(live_mutex_);
-  live_ = config;
+  live_ = reading.config;
 }
 
+/// Applies a request on top of the parameter server's values, entirely or not at all.
+/// @returns false when it names something else, or the parameter server does not answer
 bool LiveParameters::set(Group* group, const Config& wanted, Config* answer) {
   const std::lock_guard<std::mutex> lock(change_mutex_);
-  std::map<std::string, XmlRpcValue> change;
+  Values change;
   for (const auto& one : wanted.doubles) change[one.name] = one.value;
   for (const auto& one : wanted.ints) change[one.name] = one.value;
   for (const auto& one : wanted.bools) change[one.name] = XmlRpcValue(one.value != 0);
   for (const auto& one : wanted.strs) change[one.name] = one.value;
-  LiveConfig live = get();
-  const auto rows = rows_of(group->name, &live);
+  ServerConfig live = config();
+  const std::vector<Parameter> rows = rows_of(group->name, &live);
   for (const auto& one : change) {
-    const auto is_this = [&one](const auto& row) { return row.first == one.first; };
+    const auto is_this = [&one](const Parameter& row) { return name_in_group(row) == one.first; };
     if (std::any_of(rows.begin(), rows.end(), is_this)) continue;
     ROS_WARN_STREAM_THROTTLE(5.0, "a request to " << private_nh_.getNamespace() << "/"
                                                   << group->name << "/set_parameters is refused: '"
-                                                  << "~" << group->name << "/" << one.first
-                                                  << "' is none of its parameters");
+                                                  << one.first << "' is none of its parameters");
     return false;
   }
-  const bool answered = apply(group->name, change);
-  *answer = group->published;
+  const bool answered = read_server() && apply(group->name, change);
+  if (answered) publish_updates();
+  *answer = group->published;  // the values in use
   return answered;
 }
 
-/// Applies the change on top of the parameter server's values, entirely or not at all. The caller
-/// holds change_mutex_.
-/// @param change  values by name in the group; may be empty
-/// @returns false when the parameter server does not answer; then nothing changes
-bool LiveParameters::apply(const std::string& group,
-                           const std::map<std::string, XmlRpcValue>& change) {
-  if (!read_server()) return false;
+/// Writes the change to the parameter server and takes it; refuses what is wrong. The caller holds
+/// change_mutex_.
+/// @returns false when the parameter server does not take it
+bool LiveParameters::apply(const std::string& group, const Values& change) {
   XmlRpcValue tree;
-  for (const auto& [name, value] : change) {
-    XmlRpcValue* place = &tree;
-    std::istringstream path(path_of(group, name));
-    for (std::string part; std::getline(path, part, '/');) place = &(*place)[part];
-    *place = value;
-  }
-  const LiveReading reading = parse_live(tree, get());
+  XmlRpcValue* members = &tree;
+  std::istringstream path(group);
+  for (std::string part; std::getline(path, part, '/');) members = &(*members)[part];
+  for (const auto& [name, value] : change) (*members)[name] = value;
+  const LiveReading reading = parse_live(tree, config());
   if (!reading.errors.empty()) {
     ROS_WARN_STREAM_THROTTLE(5.0, kKept << join(reading.errors, "; "));
-    publish_updates();
-    return true;  // the response holds the values in use
+    return true;
   }
   for (const auto& [name, value] : change) {
-    const std::string full = path_of(group, name);
+    const std::string full = group + "/" + name;
     if (write(private_nh_.resolveName(full), value)) continue;
     set_problem("the parameter server does not take ~" + full);
     return false;
   }
-  for (std::size_t i = 0; i < configured_.size(); ++i) {
-    configured_[i] = configured_[i] || reading.found[i];
-  }
-  take(reading.config);
-  publish_updates();
+  take(reading);
   return true;
 }
 
 void LiveParameters::publish_updates() {
+  ServerConfig live = config();
   for (const auto& group : groups_) {
-    const Config now = values_of(group->name, get());
+    const Config now = config_of(rows_of(group->name, &live), number_of);
     if (now == group->published) continue;
     group->published = now;
     publish_message(group->updates, now);

@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,10 +18,9 @@
 
 namespace ist {
 
-/// Parameters that may change while the node runs: ~query/*, ~repulsion/*,
-/// ~penetration/stiffness and ~speed_scale/*. They change on the parameter server, which is read
-/// again once a second, or through dynamic_reconfigure, in one group for each of these names and
-/// for ~speed_scale/separation (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query
+/// Parameters that may change while the node runs: the live rows of the table. They change on the
+/// parameter server, which is read again once a second, or through dynamic_reconfigure, in one
+/// group for each dictionary (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query
 /// ...`). Distances of single links have no group.
 ///
 /// Every value stays in use until a valid one replaces it, whatever happens to the parameter
@@ -28,10 +28,9 @@ namespace ist {
 /// problem() says so. A request through dynamic_reconfigure takes effect entirely or not at all;
 /// one that names anything else than the group's parameters fails.
 ///
-/// This class speaks dynamic_reconfigure's messages without its generated server: a .cfg file would
-/// state defaults and ranges a second time, and that server moves a value that is out of range into
-/// it, takes names that it does not know, and writes a whole group back at each change, over a
-/// value that somebody else may just have set.
+/// dynamic_reconfigure::Server asks for a type with thirteen members for each group, the ranges
+/// among the static ones, and gives two publishers and a service for it. It also takes requests
+/// that cannot be read, and first publishes values that are not in use.
 ///
 /// Thread safe.
 class LiveParameters {
@@ -49,6 +48,7 @@ class LiveParameters {
 
  private:
   using Clock = std::chrono::steady_clock;
+  using Values = std::map<std::string, XmlRpc::XmlRpcValue>;
   /// The topics and the service of one dynamic_reconfigure server.
   struct Group {
     std::string name;
@@ -57,31 +57,30 @@ class LiveParameters {
     dynamic_reconfigure::Config published;
   };
 
-  void advertise(const std::string& name, const LiveConfig& defaults);
-  void run();
+  void advertise(const std::string& name, ServerConfig* defaults);
   void read_again();
   bool read_server();
   bool set(Group* group, const dynamic_reconfigure::Config& wanted,
            dynamic_reconfigure::Config* answer);
-  bool apply(const std::string& group, const std::map<std::string, XmlRpc::XmlRpcValue>& change);
-  void take(const LiveConfig& config);
+  bool apply(const std::string& group, const Values& change);
+  ServerConfig config() const;
+  void take(const LiveReading& reading);
   void note_startup_changes(const XmlRpc::XmlRpcValue& tree);
-  std::string lost_names() const;
+  std::string lost_names(const std::set<std::string>& found) const;
   void set_problem(const std::string& problem);
   void publish_updates();
 
   ros::NodeHandle private_nh_;
   std::mutex change_mutex_;  ///< held from reading the parameter server to the end of the change
   std::vector<std::unique_ptr<Group>> groups_;
-  std::vector<bool> configured_;  ///< by row of the table: it has been on the parameter server
-  std::vector<bool> lost_;        ///< by row: it was there and is not any more
+  std::set<std::string> configured_;  ///< live parameters that have been on the parameter server
   /// What is read at the start only, as it was then; empty until it is known.
-  std::optional<std::map<std::string, XmlRpc::XmlRpcValue>> at_start_;
+  std::optional<Values> at_start_;
   std::string logged_problem_;
   Clock::time_point logged_time_;
 
   mutable std::mutex live_mutex_;  ///< guards the members below
-  LiveConfig live_;
+  ServerConfig live_;
   std::string problem_;
   std::string without_effect_;
   Clock::time_point asked_;  ///< when the server was asked that has not answered yet; else 0

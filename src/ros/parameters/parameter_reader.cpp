@@ -87,6 +87,23 @@ struct Taker {
     *place = text.value_or(*place);
   }
 
+  void operator()(Path place) {
+    const std::optional<std::string> text = text_in(*value);
+    if (text && (text->empty() || (*text)[0] == '/')) {
+      *place.path = *text;
+    } else {
+      needed = "an absolute path is needed, for example /home/robot/NAME";
+    }
+  }
+
+  void operator()(const WordOr& either) {
+    if (value->getType() == XmlRpcValue::TypeString) {
+      (*this)(either.word);
+    } else {
+      std::visit(*this, either.other);
+    }
+  }
+
   void operator()(const Choice& choice) {
     const bool is_bool = value->getType() == XmlRpcValue::TypeBoolean;
     const std::string word = is_bool ? value_text(*value) : text_in(*value).value_or("");
@@ -221,8 +238,14 @@ bool ParameterReader::is_dictionary(const std::string& name) {
 }
 
 void ParameterReader::read(const Parameter& parameter) {
-  const std::string& name = parameter.name;
-  names_read_.insert(name);
+  std::string name = parameter.name;
+  if (!names_read_.insert(name).second) return;  // its mistake is told once
+  if (parameter.may_stand_alone) {
+    const std::string alone = name.substr(0, name.rfind('/'));
+    const bool stands_alone = has(alone) && type(alone) != XmlRpcValue::TypeStruct;
+    if (stands_alone) no_dictionaries_.insert(name = alone);  // nothing is read below it
+    names_read_.insert(name);
+  }
   for (std::size_t i = name.find('/'); i != std::string::npos; i = name.find('/', i + 1)) {
     if (!is_dictionary(name.substr(0, i))) return;
   }

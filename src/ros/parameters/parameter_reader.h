@@ -44,11 +44,13 @@ std::string with_unit(const std::string& value, const Range& range);
 struct Choice {
   std::vector<std::string> words;
   std::function<void(std::size_t)> set;
+  std::size_t current = 0;
 };
 /// @param words  in the order of the values, from 0 on
 template <class Enum>
 Choice choice(Enum* value, std::vector<std::string> words) {
-  return {std::move(words), [value](std::size_t i) { *value = static_cast<Enum>(i); }};
+  return {std::move(words), [value](std::size_t i) { *value = static_cast<Enum>(i); },
+          static_cast<std::size_t>(*value)};
 }
 
 /// A list of so many numbers.
@@ -57,21 +59,39 @@ struct Numbers {
   std::size_t count;
 };
 
+/// An absolute path, or an empty one.
+struct Path {
+  std::string* path;
+};
+
+/// A word of a list, or a value that is no string.
+struct WordOr {
+  Choice word;
+  std::variant<double*, std::vector<std::string>*> other;
+};
+
 /// Lists the values of a tree that are no dictionaries, by name.
 std::map<std::string, XmlRpc::XmlRpcValue> leaves_of(const XmlRpc::XmlRpcValue& tree);
 
 using NamePairs = std::vector<std::pair<std::string, std::string>>;
 
-/// One row of the table of parameters. The place of the value holds the default.
+/// One row of a table of parameters. The place of the value holds the default.
 struct Parameter {
-  std::string name;  ///< with slashes, such as "query/margin"
-  std::variant<double*, int*, std::size_t*, bool*, std::string*, std::vector<std::string>*,
-               NamePairs*, Numbers, Choice>
-      value;
-  Range range = {};       ///< of numbers; of an int or a size within what an int holds
-  double slider = 0.0;    ///< of a live parameter: where its slider ends; 0: at ~max_distance
-  const char* help = "";  ///< of a live parameter: a sentence
+  static constexpr double kStartOnly = -1.0;
+  using Value = std::variant<double*, int*, std::size_t*, bool*, std::string*,
+                             std::vector<std::string>*, NamePairs*, Numbers, Path, Choice, WordOr>;
 
+  std::string name;  ///< with slashes, such as "query/margin"
+  Value value;
+  Range range = {};       ///< of numbers; of an int or a size within what an int holds
+  const char* help = "";  ///< a sentence
+  /// The parameter may change while the node runs, and its slider ends here, or where 0 at
+  /// ~max_distance; kStartOnly: it is read at the start only.
+  double slider = kStartOnly;
+  /// `noise: kinect_v1` stands for `noise/sensor: kinect_v1`.
+  bool may_stand_alone = false;
+
+  bool is_live() const { return slider != kStartOnly; }
   /// A double, or a truth value as 0 or 1: all live parameters are one of these.
   double number() const;
   bool is_bool() const { return std::holds_alternative<bool*>(value); }
@@ -112,6 +132,7 @@ class ParameterReader {
   bool is_dictionary(const std::string& name);
 
   XmlRpc::XmlRpcValue tree_;
+  /// Names that were read; those that are no dictionaries, by mistake or because they stand alone.
   std::set<std::string> names_read_, no_dictionaries_;
   std::vector<std::string> errors_;
 };

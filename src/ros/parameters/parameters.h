@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -19,7 +20,6 @@
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
-#include "ros/parameters/parameter_reader.h"
 #include "ros/parameters/source_config.h"
 
 namespace ist {
@@ -130,13 +130,10 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 /// @returns an invalid value when none is set; empty when the parameter server does not answer
 std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& private_nh);
 
-/// The table of the parameters that may change, for the values of a configuration.
-std::vector<Parameter> live_parameters(LiveConfig* config);
-
 /// The live parameters of a tree, and how they were found.
 struct LiveReading {
-  LiveConfig config;
-  std::vector<bool> found;          ///< by row of the table: whether the tree has it
+  ServerConfig config;
+  std::set<std::string> found;      ///< names that the tree has
   std::vector<std::string> errors;  ///< one sentence for each that is wrong
 };
 
@@ -146,6 +143,6 @@ struct LiveReading {
 /// @param last  the last valid values. Its max_distance limits the influence distance: nothing
 ///              farther away is measured, and the vector could not end in zero. Only the links that
 ///              have a distance of their own in it keep having one
-LiveReading parse_live(const XmlRpc::XmlRpcValue& tree, const LiveConfig& last);
+LiveReading parse_live(const XmlRpc::XmlRpcValue& tree, const ServerConfig& last);
 
 }  // namespace ist

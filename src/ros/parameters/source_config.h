@@ -34,7 +34,7 @@ struct SourceMemoryConfig {
 };
 
 /// Depth cameras have 10 to 60 % of pixels without a measurement, and lidars up to 85 %, where they
-/// look at the sky. What sees less than a tenth does not see the view that it stands for.
+/// look at the sky. What sees less than a tenth does not see the view that it stands for: NO_CLOUD.
 constexpr double kMinMeasured = 0.1;
 
 /// An object of ~sources/NAME/objects.
@@ -75,8 +75,6 @@ struct SourceConfig {
   double timeout = 0.5;          ///< [s] an older message is STALE_CLOUD; > 0, may be inf
   std::string timeout_parameter = "cloud_timeout";
   bool required = true;  ///< false: the absence of this source shows in its own status only
-  /// 0 to 1: a source of which a smaller share of the points was measured is NO_CLOUD.
-  double min_measured = kMinMeasured;
   /// [s] > 0: a source whose messages have held the same bytes for longer is STALE_CLOUD. Infinity:
   /// never, as a simulation without noise repeats itself.
   double frozen_after = std::numeric_limits<double>::infinity();
@@ -85,7 +83,7 @@ struct SourceConfig {
   /// [m] self_filter_padding by link, where it is a dictionary; of other links `other_padding`.
   /// Used with kPadding. ingest.self_filter_padding is the largest.
   std::map<std::string, double> link_paddings;
-  double other_padding = 0.0;
+  double other_padding = IngestConfig().self_filter_padding;
   NoiseFilterConfig noise;    ///< used for clouds and depth images
   ScanLimits scan;            ///< used for scans
   OctreeLimits map;           ///< used for maps

@@ -130,19 +130,18 @@ Status view_status(const SourceReport& source) {
     return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
                                           " is NaN, the sensor sees nothing at all"};
   }
-  const std::string prefix = prefix_of(source);
   const std::string question =
       counts.not_believed <= counts.received / 2
           ? "; is the sensor covered or blind?"
-          : format_text(": more than %g m (~", source.sensor_range) + prefix +
-                "sensor_range), or than range_max of a scan; are its lengths in metres?";
+          : format_text(": more than %g m (or a larger ~", source.sensor_range) +
+                prefix_of(source) +
+                "max_range), or than range_max of a scan; are its lengths in metres?";
   return {ProximityArray::NO_CLOUD,
           title(source) + ": " +
               format_text("only %.1f %% of the newest ", 100.0 * counts.measured_share()) +
               source.noun + " was measured, " +
-              format_text("at least %g %% are needed (~", 100.0 * source.min_measured) + prefix +
-              "min_measured): of " + std::to_string(counts.received) + " points " +
-              unmeasured(counts) + question};
+              format_text("at least %g %% are needed: of ", 100.0 * source.min_measured) +
+              std::to_string(counts.received) + " points " + unmeasured(counts) + question};
 }
 
 }  // namespace
