@@ -46,12 +46,12 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       spheres_(private_nh),
       diagnostics_(nh, without_slash(private_nh.getNamespace()), config),
       buffer_(ros::Duration(10.0)),
-      listener_(&buffer_, with_queue(nh, &pose_thread_)),
       loader_(config, nh),
       live_(private_nh, config),
       contact_loader_(config, loader_, [this] {  // a request waits, or the node ends
         return !model_thread_.queue()->isEmpty() || !model_thread_.is_running();
       }) {
+  buffer_.subscribe(with_queue(nh, &pose_thread_));
   model_thread_.start("ist model", [this] {
     loader_.load_when_due();
     contact_loader_.pack_when_due();
@@ -69,8 +69,8 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       joint_state_period_.note(Clock::now());
       cycle_signal_.notify();
     };
-    joint_states_ =
-        std::make_unique<JointStateListener>(&buffer_, with_queue(nh_, &pose_thread_), on_state);
+    joint_states_ = std::make_unique<JointStateListener>(&buffer_, with_queue(nh_, &pose_thread_),
+                                                         "joint_states", "", on_state);
   }
   const auto live = [this] { return live_config(); };
   if (config_.unknown_space != UnknownSpace::kFree) {
@@ -116,7 +116,7 @@ ProximityServer::Impl::~Impl() {
 void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Publisher& filtered) {
   if (config.type == SourceType::kWorld) {
     inputs_.push_back(std::make_shared<WorldSource>(config, with_queue(nh_, &pose_thread_),
-                                                    private_nh_, buffer_));
+                                                    private_nh_, &buffer_));
     return sources_.push_back(inputs_.back());
   }
   std::shared_ptr<SourceMemory> memory;
@@ -219,7 +219,7 @@ void ProximityServer::Impl::run_cycle() {
   notice_standing_root();
   spheres_.repeat_when_due();
   const auto message = messages_.take();
-  const std::string transform_problem = listener_.problem();
+  const std::string transform_problem = buffer_.problem();
   LiveConfig live = live_config();
   live.query.deadline = deadline_of(live.query.deadline, period());
   if (live.query.margin != margin_) set_source_targets(live.query);
@@ -247,7 +247,7 @@ void ProximityServer::Impl::run_cycle() {
 
 /// Tells the parts that do not notice a backward jump of the clock themselves.
 void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
-  listener_.notice_clock_jump();
+  buffer_.notice_clock_jump();
   if (now < last_now_) {
     last_stamp_ = ros::Time();
     if (cycle_) cycle_->forget();

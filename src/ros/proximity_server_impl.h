@@ -31,7 +31,6 @@
 #include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/transform_buffer.h"
-#include "ros/poses/transform_listener.h"
 #include "ros/poses/usual_period.h"
 #include "ros/services/link_pair_service.h"
 #include "ros/services/model_services.h"
@@ -87,9 +86,8 @@ class ProximityServer::Impl {
   ProximityMarkers marker_drawer_;
   SpherePublisher spheres_;
   DiagnosticsPublisher diagnostics_;
-  TransformBuffer buffer_;
   CallbackThread pose_thread_;  ///< of tf and the joint states
-  TransformListener listener_;
+  TransformBuffer buffer_;
   SourceMemories memories_;
   SceneWarmUp warm_up_{sources_};  ///< used by the threads of the sources
   CloudSources sources_;

@@ -40,15 +40,15 @@ void ProximityServer::Impl::take_model() {
     cycle_ = std::make_unique<ProximityCycle>(
         model_, config_,
         make_pose_source(*model_, config_, buffer_, joint_states_.get(),
-                         JointPoseSource::Which::kTaken),
+                         JointStateListener::Which::kTaken),
         CloudSelection::Reader::kOnly, unknown_space_.get());
     cycle_->continue_from(last_stamp_);
   } else {
     cycle_.reset();
   }
   if (joint_states_) {
-    listener_.ignore(model_->kinematics ? computed_frames(*model_->kinematics)
-                                        : std::vector<std::string>());
+    buffer_.ignore(model_->kinematics ? computed_frames(*model_->kinematics)
+                                      : std::vector<std::string>());
     joint_states_->set_kinematics(model_->kinematics);
   }
   query_service_->set_model(model_);

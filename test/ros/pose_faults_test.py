@@ -302,7 +302,7 @@ class PoseFaultsTest(unittest.TestCase):
         self.start_rival("joints")
         message = node.wait_for_status(ProximityArray.NO_POSE, "has two publishers that disagree")
         self.assertIn("joint 'turn'", message.status_text)
-        self.assertIn("/rival_joints says 1.000", message.status_text.replace(" and /", " /"))
+        self.assertIn("/rival_joints", message.status_text)
         begin = len(node.messages)
         node.wait_for(lambda m: len(node.messages) > begin + 100, "some more")
         for m in node.messages[begin:]:

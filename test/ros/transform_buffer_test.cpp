@@ -9,7 +9,6 @@
 #include <string>
 #include <thread>
 
-#include "ros/poses/publisher_track.h"
 #include "ros/poses/transforms.h"
 #include "support/allocations.h"
 
@@ -95,7 +94,7 @@ TEST(TransformBuffer, refusalsOfStaticTransformsStay) {
   EXPECT_EQ(buffer.why_refused("world", "arm"), "");
   EXPECT_NE(buffer.why_refused("world", "camera").find("from 'camera' to 'base'"),
             std::string::npos);
-  EXPECT_NE(buffer.last_refusal().find("length 0.9"), std::string::npos);
+  EXPECT_NE(buffer.problem().find("length 0.9"), std::string::npos);
   // A jump of the clock does not make it valid, and transforms of the new time are taken.
   buffer.clear();
   EXPECT_NE(buffer.why_refused("world", "camera"), "");
@@ -103,7 +102,7 @@ TEST(TransformBuffer, refusalsOfStaticTransformsStay) {
   // A good one ends it.
   EXPECT_EQ(buffer.add(transform("base", "camera", 0.0), "/a", true, ros::Time(10.0)), "");
   EXPECT_EQ(buffer.why_refused("world", "camera"), "");
-  EXPECT_EQ(buffer.last_refusal(), "");
+  EXPECT_EQ(buffer.problem(), "");
 }
 
 TEST(TransformBuffer, agesCountFromReceipt) {
@@ -279,42 +278,44 @@ TEST(TransformBuffer, disputesDoNotFlicker) {
   }
   EXPECT_TRUE(is_disputed);
 
-  PublisherTrack three, skewed;
-  std::string other;
-  PublisherTrack::Values here = PublisherTrack::Values::Zero(), there = here, others;
-  there[0] = 0.1;
+  TransformBuffer three(ros::Duration(10.0)), skewed(ros::Duration(10.0));
+  const auto add = [](TransformBuffer* to, const char* publisher, double stamp, double x) {
+    EXPECT_EQ(to->add(transform("base", "arm", stamp, x), publisher, false, ros::Time(stamp)), "");
+    return !to->dispute("base", "arm").empty();
+  };
   for (int i = 0; i < 100; ++i) {
     const double t = 100.0 + 0.02 * i;
-    three.add("/a", ros::Time(t), here, &other, &others);
-    three.add("/b", ros::Time(t + 0.005), here, &other, &others);
-    EXPECT_EQ(three.add("/c", ros::Time(t + 0.01), there, &other, &others), i > 0);
-    skewed.add("/late", ros::Time(t), here, &other, &others);
-    EXPECT_EQ(skewed.add("/ahead", ros::Time(t + 0.5), there, &other, &others), i >= 25) << i;
+    add(&three, "/a", t, 0.0);
+    add(&three, "/b", t + 0.005, 0.0);
+    EXPECT_EQ(add(&three, "/c", t + 0.01, 0.1), i > 0);
+    add(&skewed, "/late", t, 0.0);
+    EXPECT_EQ(add(&skewed, "/ahead", t + 0.495, 0.1), i >= 25) << i;
   }
 }
 
 // One publisher never disagrees with itself, and one that takes over does not either.
-TEST(PublisherTrack, oneAfterAnother) {
-  PublisherTrack track;
-  std::string other;
-  PublisherTrack::Values values = PublisherTrack::Values::Zero(), others;
+TEST(TransformBuffer, onePublisherAfterAnotherIsNoDispute) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  const auto add = [&buffer](const char* publisher, geometry_msgs::TransformStamped message) {
+    EXPECT_EQ(buffer.add(message, publisher, false, message.header.stamp), "");
+    return buffer.dispute("base", message.child_frame_id);
+  };
   for (int i = 0; i < 100; ++i) {
-    values[0] = i % 2;
-    EXPECT_FALSE(track.add("/a", ros::Time(100.0 + 0.01 * i), values, &other, &others));
+    EXPECT_EQ(add("/a", transform("base", "arm", 100.0 + 0.01 * i, i % 2)), "");
   }
+  double x = 0.0;
   for (int i = 0; i < 100; ++i) {
-    values[0] = 5.0 + std::sin(i);
-    EXPECT_FALSE(track.add("/b", ros::Time(101.5 + 0.01 * i), values, &other, &others));
+    x = 5.0 + std::sin(i);
+    EXPECT_EQ(add("/b", transform("base", "arm", 101.5 + 0.01 * i, x)), "");
   }
   // The same stamp, and other values.
-  values[0] += 0.02;
-  EXPECT_TRUE(track.add("/c", ros::Time(101.5 + 0.99), values, &other, &others));
-  EXPECT_EQ(other, "/b");
+  EXPECT_NE(add("/c", transform("base", "arm", 101.5 + 0.99, x + 0.02)).find("/b and /c"),
+            std::string::npos);
   // A quaternion and its negative agree.
-  PublisherTrack turned;
-  values << 0, 0, 0, 0, 0, 0, 1;
-  EXPECT_FALSE(turned.add("/a", ros::Time(100.0), values, &other, &others));
-  EXPECT_FALSE(turned.add("/b", ros::Time(100.0), -values, &other, &others));
+  geometry_msgs::TransformStamped turned = transform("base", "hand", 100.0);
+  EXPECT_EQ(add("/a", turned), "");
+  turned.transform.rotation.w = -1.0;
+  EXPECT_EQ(add("/b", turned), "");
 }
 
 }  // namespace

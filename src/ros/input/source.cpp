@@ -103,19 +103,25 @@ std::shared_ptr<const SourceSnapshot> Source::share(const SnapshotRequest& reque
   return place(request, placed.get()).empty() ? placed : nullptr;
 }
 
-/// Looks up where the frames of objects and of a map are.
+/// Looks up where the frames of objects and of a map are at an instant, or else at the newest one
+/// that tf knows.
 std::string Source::place(const SnapshotRequest& request, SourceSnapshot* snapshot) const {
-  const std::string& fixed = snapshot->fixed_frame;
   std::vector<Eigen::Isometry3d>& X_FB = snapshot->world.X_FB;
   snapshot->lags.resize(X_FB.size() + (snapshot->cloud.boxes ? 1 : 0));
-  std::string problem;
-  for (std::size_t i = 0; i < X_FB.size() && problem.empty(); ++i) {
-    const std::string& frame = snapshot->world.world->frames()[i];
-    problem = place_frame(fixed, frame, request, &X_FB[i], &snapshot->lags[i]);
+  const auto place_frame = [&](const std::string& frame, Lag* lag, Eigen::Isometry3d* X) {
+    X->setIdentity();
+    if (frame == kFixedFrame) return std::string();
+    return look_up_near(buffer_, snapshot->fixed_frame, frame, request.time, request.max_age, X,
+                        lag);
+  };
+  for (std::size_t i = 0; i < X_FB.size(); ++i) {
+    const std::string problem =
+        place_frame(snapshot->world.world->frames()[i], &snapshot->lags[i], &X_FB[i]);
+    if (!problem.empty()) return problem;
   }
-  if (!problem.empty() || !snapshot->cloud.boxes) return problem;
-  Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();
-  problem = place_frame(fixed, snapshot->map_frame, request, &X_FM, &snapshot->lags.back());
+  if (!snapshot->cloud.boxes) return "";
+  Eigen::Isometry3d X_FM;
+  const std::string problem = place_frame(snapshot->map_frame, &snapshot->lags.back(), &X_FM);
   if (problem.empty()) snapshot->cloud.X_FM = X_FM * snapshot->X_BM;
   return problem;
 }
@@ -125,16 +131,10 @@ std::string Source::doubt_of_place(const SourceSnapshot& snapshot) const {
   const std::string& fixed = snapshot.fixed_frame;
   for (std::size_t i = 0; i < snapshot.world.X_FB.size(); ++i) {
     const std::string& frame = snapshot.world.world->frames()[i];
-    std::string doubt = is_in_tf(frame) ? doubt_of_pose(buffer_, fixed, frame) : "";
+    std::string doubt = frame == kFixedFrame ? "" : doubt_of_pose(buffer_, fixed, frame);
     if (!doubt.empty()) return doubt;
   }
   return snapshot.map_frame.empty() ? "" : doubt_of_pose(buffer_, fixed, snapshot.map_frame);
-}
-
-std::string Source::place_frame(const std::string& fixed_frame, const std::string& frame,
-                                const SnapshotRequest& request, Eigen::Isometry3d* X_FB,
-                                Lag* lag) const {
-  return look_up_near(buffer_, fixed_frame, frame, request.time, request.max_age, X_FB, lag);
 }
 
 /// Whether a snapshot was made with `model`, or one of the same geometry, since the clock's last

@@ -56,6 +56,9 @@ class ObstacleSource {
 
 using CloudSources = std::vector<std::shared_ptr<ObstacleSource>>;
 
+/// The frame of what stands still in the fixed frame, whatever that is.
+constexpr const char* kFixedFrame = "(fixed frame)";
+
 /// The robot and the frame that a source's clouds are made for. Clouds are transformed to the fixed
 /// frame, filtered with the robot's model and cropped to the region of interest.
 struct SourceTarget {
@@ -103,17 +106,6 @@ class Source : public ObstacleSource {
   void stop();
   /// The thread's work, until running_ is false.
   virtual void run() = 0;
-  /// Looks up where a frame of a map or world is at an instant, or else at the newest one that tf
-  /// knows.
-  /// @param X_FB  the identity at first
-  /// @returns empty on success, else a sentence
-  virtual std::string place_frame(const std::string& fixed_frame, const std::string& frame,
-                                  const SnapshotRequest& request, Eigen::Isometry3d* X_FB,
-                                  Lag* lag) const;
-
-  /// Whether a frame of a map or world is one of tf.
-  virtual bool is_in_tf(const std::string& /*frame*/) const { return true; }
-
   SourceTarget newest_target();
   /// Changes the report under the lock.
   template <typename Change>

@@ -22,10 +22,11 @@ constexpr std::uint32_t kWorldQueueSize = 1000;
 }  // namespace
 
 WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
-                         const TransformBuffer& buffer)
-    : Source(config, nh, buffer, ""), builder_(config.world.limits) {
+                         TransformBuffer* buffer)
+    : Source(config, nh, *buffer, ""), builder_(config.world.limits) {
   if (!config.world.robot.description.empty()) {
-    robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, nh);
+    robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, config.name,
+                                          nh, buffer);
     is_robot_read_ = false;
     update([](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
   }
@@ -36,22 +37,6 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
                                  ros::TransportHints().tcpNoDelay())};
   }
   start();
-}
-
-/// Places the links of the other robot, and what stands still in the fixed frame.
-std::string WorldSource::place_frame(const std::string& fixed_frame, const std::string& frame,
-                                     const SnapshotRequest& request, Eigen::Isometry3d* X_FB,
-                                     Lag* lag) const {
-  if (frame == kFixedFrame) return "";  // it is the identity for good
-  if (!robot_ || !robot_->owns(frame)) {
-    return Source::place_frame(fixed_frame, frame, request, X_FB, lag);
-  }
-  return robot_->look_up_frame(buffer_, fixed_frame, frame, request.time, request.max_age, X_FB,
-                               lag);
-}
-
-bool WorldSource::is_in_tf(const std::string& frame) const {
-  return frame != kFixedFrame && !(robot_ && robot_->owns(frame));
 }
 
 void WorldSource::run() {

@@ -25,9 +25,6 @@
 
 namespace ist {
 
-/// The frame of objects that stand still in the fixed frame, whatever that is.
-constexpr const char* kFixedFrame = "(fixed frame)";
-
 /// A known world: objects from parameters, from a MoveIt scene file and from a topic
 /// (WorldObjects), and the links of another robot. A thread of its own reads meshes and builds
 /// hierarchies, so that no query waits for them.
@@ -41,7 +38,7 @@ class WorldSource : public Source {
   /// @param buffer  outlives this
   /// @param private_nh  of ~world/NAME, the markers
   WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
-              const TransformBuffer& buffer);
+              TransformBuffer* buffer);
   ~WorldSource() override { stop(); }
 
  private:
@@ -69,10 +66,6 @@ class WorldSource : public Source {
   void publish();
   void free_unused();
   void publish_markers();
-  std::string place_frame(const std::string& fixed_frame, const std::string& frame,
-                          const SnapshotRequest& request, Eigen::Isometry3d* X_FB,
-                          Lag* lag) const override;
-  bool is_in_tf(const std::string& frame) const override;
 
   ros::Publisher markers_;
   std::unique_ptr<OtherRobot> robot_;  ///< null: none

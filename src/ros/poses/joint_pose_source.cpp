@@ -1,7 +1,6 @@
 #include "ros/poses/joint_pose_source.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -18,13 +17,12 @@ namespace {
 // one machine are. What is allowed here makes poses older than header.stamp says.
 constexpr double kLag = 0.05;
 
-constexpr std::chrono::seconds kDisputeMemory(1);
 constexpr double kStampResolution = 1e-3;  // [s]
 
 }  // namespace
 
 JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
-                                 JointStateListener* joints, Which which,
+                                 JointStateListener* joints, JointStateListener::Which which,
                                  const TransformBuffer& buffer, const std::string& fixed_frame,
                                  const std::vector<std::string>& links,
                                  const std::vector<bool>& wanted, double timeout)
@@ -74,11 +72,10 @@ PoseProblem JointPoseSource::problem_of(std::size_t joint, const ros::Time& now)
                 cause(),
             position.refusal != nullptr};
   }
-  if (position.dispute &&
-      std::chrono::steady_clock::now() - position.dispute_time < kDisputeMemory) {
-    return {*position.dispute, true};
-  }
-  return {};
+  const Kinematics::Joint& at = kinematics_->joints()[joint];
+  const auto& bodies = kinematics_->bodies();
+  const std::string dispute = buffer_.dispute(bodies[at.parent], bodies[at.child]);
+  return {dispute.empty() ? "" : name() + ": " + dispute, !dispute.empty()};
 }
 
 /// Whether a joint is later than its samples usually are: by more than one and a half times its
@@ -113,11 +110,7 @@ std::string JointPoseSource::is_late(std::size_t joint, std::size_t newest) cons
 /// @returns the newest stamp of a usable position; 0 when there is none
 ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   const auto& joints = kinematics_->joints();
-  if (which_ == Which::kTaken) {
-    listener_.taken(*kinematics_, &positions_);
-  } else {
-    listener_.newest(*kinematics_, &positions_);
-  }
+  listener_.read(which_, *kinematics_, &positions_);
   positions_.resize(joints.size());
   q_.assign(joints.size(), std::nan(""));
   joint_problems_.assign(joints.size(), PoseProblem());
@@ -265,7 +258,7 @@ void JointPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time&
 std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
                                              const TransformBuffer& buffer,
                                              JointStateListener* joints,
-                                             JointPoseSource::Which which) {
+                                             JointStateListener::Which which) {
   const std::string fixed_frame = fixed_frame_of(model, config);
   const std::vector<std::string> names = link_names(*model.robot);
   const std::vector<bool> wanted = wanted_links(model);

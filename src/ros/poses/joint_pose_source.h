@@ -29,9 +29,6 @@ namespace ist {
 /// instant at which both tf and the joints are known. The instant never goes back.
 class JointPoseSource : public PoseSource {
  public:
-  /// kTaken: the message that JointStateListener::take_next() has taken.
-  enum class Which { kNewest, kTaken };
-
   /// @param joints       feeds `buffer`; both outlive this
   /// @param which        the joint states that look_up() uses
   /// @param fixed_frame  frame F
@@ -39,9 +36,9 @@ class JointPoseSource : public PoseSource {
   /// @param wanted       by link: false leaves it unknown, without a problem
   /// @param timeout      [s]
   JointPoseSource(std::shared_ptr<const Kinematics> kinematics, JointStateListener* joints,
-                  Which which, const TransformBuffer& buffer, const std::string& fixed_frame,
-                  const std::vector<std::string>& links, const std::vector<bool>& wanted,
-                  double timeout);
+                  JointStateListener::Which which, const TransformBuffer& buffer,
+                  const std::string& fixed_frame, const std::vector<std::string>& links,
+                  const std::vector<bool>& wanted, double timeout);
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
@@ -61,7 +58,7 @@ class JointPoseSource : public PoseSource {
 
   std::shared_ptr<const Kinematics> kinematics_;
   JointStateListener& listener_;
-  const Which which_;
+  const JointStateListener::Which which_;
   const TransformBuffer& buffer_;
   std::string fixed_frame_;
   LinkPlacer placer_;
@@ -89,6 +86,6 @@ class JointPoseSource : public PoseSource {
 std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
                                              const TransformBuffer& buffer,
                                              JointStateListener* joints,
-                                             JointPoseSource::Which which);
+                                             JointStateListener::Which which);
 
 }  // namespace ist

@@ -24,28 +24,32 @@ constexpr std::chrono::seconds kProblemAge(1);
 constexpr std::size_t kMaxNames = 10000;
 constexpr double kAgreement = 0.01;  // [rad, m] between a mimic joint and where its leader puts it
 constexpr double kMaxSpacing = 1.0;  // [s] after a longer pause, the usual spacing is not known
-constexpr const char* kUrdf = "the URDF";  // who states the fixed joints
+constexpr std::size_t kMaxWaiting = 10;
 constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 
 }  // namespace
 
 JointStateListener::JointStateListener(TransformBuffer* buffer, ros::NodeHandle nh,
+                                       const std::string& topic, std::string prefix,
                                        std::function<void()> on_state)
-    : buffer_(*buffer), on_state_(std::move(on_state)) {
-  report_.topic = nh.resolveName("joint_states");
+    : buffer_(*buffer),
+      prefix_(std::move(prefix)),
+      urdf_(prefix_ + "the URDF"),
+      on_state_(std::move(on_state)) {
+  report_.topic = nh.resolveName(topic);
   using Event = ros::MessageEvent<const sensor_msgs::JointState>;
   const boost::function<void(const Event&)> callback = [this](const Event& event) {
     receive(event);
   };
   subscriber_ = nh.subscribe<sensor_msgs::JointState, const Event&>(
-      "joint_states", 100, callback, {}, ros::TransportHints().tcpNoDelay());
+      topic, 100, callback, {}, ros::TransportHints().tcpNoDelay());
 }
 
 void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinematics) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (kinematics == kinematics_) return;
   kinematics_ = std::move(kinematics);
-  buffer_.withdraw(kUrdf);
+  buffer_.withdraw(urdf_);
   index_.clear();
   led_by_.clear();
   forget();
@@ -58,41 +62,35 @@ void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinema
     const Kinematics::Joint& joint = kinematics_->joints()[j];
     index_[joint.name] = j;
     if (joint.type == JointType::kFixed) {
-      put_into_tf(j, 0.0, ros::Time(), true);
+      put_into_tf(j, 0.0, ros::Time(), urdf_);
     } else if (!joint.has_unstated_pose()) {
       if (joint.source != j) led_by_[joint.source].push_back(j);
     }
   }
 }
 
-void JointStateListener::newest(const Kinematics& kinematics, JointPositions* positions) {
-  copy(positions_.newest(), kinematics, positions);
+void JointStateListener::read(Which which, const Kinematics& kinematics,
+                              JointPositions* positions) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  if (&kinematics != kinematics_.get()) return positions->clear();
+  *positions = which == Which::kTaken ? taken_ : newest_;
 }
 
 void JointStateListener::take_next() {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
-  positions_.take_next();
-}
-
-void JointStateListener::taken(const Kinematics& kinematics, JointPositions* positions) {
-  copy(positions_.taken(), kinematics, positions);
-}
-
-void JointStateListener::copy(const JointPositions& from, const Kinematics& kinematics,
-                              JointPositions* positions) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  notice_clock_jump();
-  if (&kinematics == kinematics_.get()) {
-    *positions = from;
+  if (waiting_.empty()) {
+    taken_ = newest_;
   } else {
-    positions->clear();
+    taken_.swap(waiting_.front());
+    waiting_.pop_front();
   }
 }
 
 bool JointStateListener::is_waiting() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return positions_.is_waiting();
+  return !waiting_.empty();
 }
 
 JointStateReport JointStateListener::report() {
@@ -114,8 +112,9 @@ void JointStateListener::notice_clock_jump() {
 /// The caller holds mutex_.
 void JointStateListener::forget() {
   const std::size_t joints = kinematics_ ? kinematics_->joints().size() : 0;
-  positions_.reset(joints);
-  tracks_.assign(joints, PublisherTrack());
+  newest_.assign(joints, JointPosition());
+  taken_ = newest_;
+  waiting_.clear();
   stated_.clear();
   place_.assign(joints, kNowhere);
 }
@@ -134,10 +133,14 @@ void JointStateListener::receive(const ros::MessageEvent<const sensor_msgs::Join
     notice_clock_jump();
     if (!kinematics_) return;
     ++report_.messages;
-    is_new = read(*event.getConstMessage(), event.getPublisherName());
+    is_new = use_message(*event.getConstMessage(), event.getPublisherName());
     if (is_new) {
       ++report_.used;
-      report_.skipped += positions_.push();
+      if (waiting_.size() == kMaxWaiting) {
+        report_.skipped += waiting_.size();
+        waiting_.clear();
+      }
+      waiting_.push_back(newest_);
     }
   }
   if (is_new) on_state_();
@@ -205,8 +208,8 @@ void JointStateListener::collect(const sensor_msgs::JointState& message, bool co
 }
 
 /// Reads all positions of a message; returns whether one of them was new.
-bool JointStateListener::read(const sensor_msgs::JointState& message,
-                              const std::string& publisher) {
+bool JointStateListener::use_message(const sensor_msgs::JointState& message,
+                                     const std::string& publisher) {
   if (message.position.empty()) return false;  // the message holds velocities or efforts alone
   const std::string problem = why_unusable(message);
   collect(message, problem.empty());
@@ -224,24 +227,24 @@ bool JointStateListener::read(const sensor_msgs::JointState& message,
       drop(one.fault, 1);
       continue;
     }
-    JointPosition& position = positions_.at(one.joint);
+    JointPosition& position = newest_[one.joint];
     // After a publisher whose clock was ahead, one whose clock is right is new all the same.
     const bool was_ahead = position.sent > position.stamp;
     const bool is_newer = was_ahead ? stamp > position.stamp : message.header.stamp > position.sent;
-    note_publisher(one, message.header.stamp, publisher);
+    put_into_tf(one.joint, one.q, stamp, publisher);
     if (!is_newer) continue;
     position.sent = message.header.stamp;
-    use(one, stamp);
+    use(one, stamp, publisher);
     if (first == kNowhere) first = one.joint;
     position.companion = last == kNowhere ? one.joint : last;
     last = one.joint;
   }
   if (first == kNowhere) return false;
-  positions_.at(first).companion = last;
+  newest_[first].companion = last;
   for (const Stated& one : stated_) {
     if (!kinematics_->joints()[one.joint].is_free()) compare_with_leader(one.joint);
   }
-  for (const Stated& one : stated_) positions_.at(one.joint).is_missing = !one.fault.empty();
+  for (const Stated& one : stated_) newest_[one.joint].is_missing = !one.fault.empty();
   return true;
 }
 
@@ -259,15 +262,16 @@ ros::Time JointStateListener::counted_stamp(const ros::Time& stamp) {
 }
 
 void JointStateListener::refuse(std::size_t joint, const std::string& reason) {
-  JointPosition& position = positions_.at(joint);
+  JointPosition& position = newest_[joint];
   if (position.refusal && *position.refusal == reason) return;
   position.refusal = std::make_shared<const std::string>(reason);
 }
 
 /// Makes a position the joint's newest one.
-void JointStateListener::use(const Stated& stated, const ros::Time& stamp) {
+void JointStateListener::use(const Stated& stated, const ros::Time& stamp,
+                             const std::string& publisher) {
   const Kinematics::Joint& joint = kinematics_->joints()[stated.joint];
-  JointPosition& position = positions_.at(stated.joint);
+  JointPosition& position = newest_[stated.joint];
   if (stated.q < joint.lower - kLimitSlack || stated.q > joint.upper + kLimitSlack) {
     std::ostringstream text;
     text << "joint '" << joint.name << "' is at " << stated.q << ", outside its limits of "
@@ -287,30 +291,29 @@ void JointStateListener::use(const Stated& stated, const ros::Time& stamp) {
   position.refusal.reset();
   position.is_missing = false;
   position.is_implausible = is_implausible(joint, stated.q);
-  if (!is_later) return;
-  put_into_tf(stated.joint, stated.q, stamp, false);
-  follow(stated.joint, stated.q, stamp);
+  if (is_later) follow(stated.joint, stated.q, stamp, publisher);
 }
 
 /// Moves the mimics of a joint that has moved, but for those that are stated.
-void JointStateListener::follow(std::size_t leader, double q, const ros::Time& stamp) {
+void JointStateListener::follow(std::size_t leader, double q, const ros::Time& stamp,
+                                const std::string& publisher) {
   for (const std::size_t j : led_by_[leader]) {
     if (place_[j] != kNowhere) continue;  // the same message states it
-    JointPosition& own = positions_.at(j);
+    JointPosition& own = newest_[j];
     const bool has_stopped = !own.strays && seconds_between(own.stamp, stamp) > kMaxSpacing;
     if (own.stamp.isZero() || has_stopped) own = JointPosition();
     if (!own.stamp.isZero()) continue;
     const Kinematics::Joint& joint = kinematics_->joints()[j];
-    put_into_tf(j, joint.multiplier * q + joint.offset, stamp, false);
+    put_into_tf(j, joint.multiplier * q + joint.offset, stamp, publisher);
   }
 }
 
 /// Notes whether a mimic joint is where its leader puts it, and tells once that it is not.
 void JointStateListener::compare_with_leader(std::size_t joint) {
-  JointPosition& own = positions_.at(joint);
+  JointPosition& own = newest_[joint];
   if (std::isnan(own.q)) return;
   const Kinematics::Joint& at = kinematics_->joints()[joint];
-  const double led = at.multiplier * positions_.newest()[at.source].q + at.offset;
+  const double led = at.multiplier * newest_[at.source].q + at.offset;
   const bool strayed = std::exchange(own.strays, !(std::abs(own.q - led) <= kAgreement));
   if (!own.strays || strayed || std::isnan(led)) return;
   drop("joint '" + at.name +
@@ -320,32 +323,16 @@ void JointStateListener::compare_with_leader(std::size_t joint) {
        0);
 }
 
-void JointStateListener::note_publisher(const Stated& stated, const ros::Time& stamp,
-                                        const std::string& publisher) {
-  PublisherTrack::Values values = PublisherTrack::Values::Zero(), other_values;
-  values[0] = stated.q;
-  std::string other;
-  if (!tracks_[stated.joint].add(publisher, stamp, values, &other, &other_values)) return;
-  JointPosition& position = positions_.at(stated.joint);
-  const std::string text = "joint '" + kinematics_->joints()[stated.joint].name +
-                           "' has two publishers that disagree: " + other +
-                           format_text(" says %.3f and ", other_values[0]) + publisher +
-                           format_text(" says %.3f; stop one of them", stated.q);
-  position.dispute = std::make_shared<const std::string>(text);
-  position.dispute_time = std::chrono::steady_clock::now();
-  drop(text, 0);
-}
-
 void JointStateListener::put_into_tf(std::size_t joint, double q, const ros::Time& stamp,
-                                     bool is_static) {
+                                     const std::string& publisher) {
   const Kinematics::Joint& at = kinematics_->joints()[joint];
   geometry_msgs::TransformStamped message;
   message.transform = to_message(kinematics_->joint_pose(joint, q));
   message.header.stamp = stamp;
-  message.header.frame_id = kinematics_->bodies()[at.parent];
-  message.child_frame_id = kinematics_->bodies()[at.child];
-  const std::string problem =
-      buffer_.add(message, is_static ? kUrdf : "joint_states", is_static, last_now_);
+  message.header.frame_id = prefix_ + kinematics_->bodies()[at.parent];
+  message.child_frame_id = prefix_ + kinematics_->bodies()[at.child];
+  const bool is_static = at.type == JointType::kFixed;
+  const std::string problem = buffer_.add(message, publisher, is_static, last_now_);
   if (!problem.empty()) drop(problem, 1);
 }
 

@@ -5,8 +5,11 @@
 #include <sensor_msgs/JointState.h>
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -14,11 +17,27 @@
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
-#include "ros/poses/joint_position_queue.h"
-#include "ros/poses/publisher_track.h"
 #include "ros/poses/transform_buffer.h"
 
 namespace ist {
+
+/// A joint's newest position that could be used, and what is wrong with newer ones.
+struct JointPosition {
+  /// [rad, m]; NaN and stamp 0 until a message states it.
+  double q = std::numeric_limits<double>::quiet_NaN();
+  /// The stamp of the message; the receipt where that is ahead of the clock. Never goes back.
+  ros::Time stamp;
+  ros::Time sent;        ///< the message's stamp
+  double spacing = 0.0;  ///< [s] usual time between two stamps; 0: not known yet
+  /// Another joint that was in the same message; itself when there was none.
+  std::size_t companion = 0;
+  std::shared_ptr<const std::string> refusal;  ///< why the newest sample is not used; null: it is
+  bool is_missing =
+      false;            ///< the newest message had new positions of other joints, not of this one
+  bool strays = false;  ///< a mimic joint that was elsewhere than where its leader puts it
+  bool is_implausible = false;  ///< far outside the joint's limits
+};
+using JointPositions = std::vector<JointPosition>;  ///< by joint of the kinematics
 
 /// Counts of joint states for the diagnostics, since the kinematics was set.
 struct JointStateReport {
@@ -45,19 +64,27 @@ struct JointStateReport {
 /// which is reported. Once a second has passed without a statement, it follows its leader again,
 /// unless the two differed.
 ///
-/// Every joint's pose also goes into a tf buffer, which interpolates it at the stamps of clouds and
-/// combines it with all other frames: cameras on links, the frame in which the robot stands.
+/// Every joint's pose also goes into a tf buffer, which interpolates it at the stamps of clouds,
+/// combines it with all other frames (cameras on links, the frame in which the robot stands), and
+/// tells where two publishers disagree.
 ///
 /// Every message with a new position waits until take_next() takes it, so that results answer each
-/// of them, also after a moment without a processor (see JointPositionQueue).
+/// of them, also after a moment without a processor. Where ten wait already, the robot has gone on
+/// too far: those are dropped.
 ///
 /// When the ROS clock jumps back, all positions are forgotten. Thread safe.
 class JointStateListener {
  public:
-  /// @param buffer   outlives this
-  /// @param nh       in the namespace that `joint_states` is relative to
-  /// @param on_state called from the listener's thread after each message with a new position
-  JointStateListener(TransformBuffer* buffer, ros::NodeHandle nh, std::function<void()> on_state);
+  /// kTaken: the positions just after the message that take_next() took last.
+  enum class Which { kNewest, kTaken };
+
+  /// @param buffer    outlives this
+  /// @param nh        in the namespace that the topic is relative to
+  /// @param topic     of the joint states
+  /// @param prefix    of the links' frames in the buffer
+  /// @param on_state  called from the listener's thread after each message with a new position
+  JointStateListener(TransformBuffer* buffer, ros::NodeHandle nh, const std::string& topic,
+                     std::string prefix, std::function<void()> on_state);
   JointStateListener(const JointStateListener&) = delete;
   JointStateListener& operator=(const JointStateListener&) = delete;
 
@@ -65,15 +92,13 @@ class JointStateListener {
   /// listener forget all positions.
   void set_kinematics(std::shared_ptr<const Kinematics> kinematics);
 
-  /// The newest positions by joint; empty when messages are read for another kinematics.
-  void newest(const Kinematics& kinematics, JointPositions* positions);
+  /// Gives the positions by joint; none when messages are read for another kinematics.
+  void read(Which which, const Kinematics& kinematics, JointPositions* positions);
 
   /// Whether a message waits for take_next().
   bool is_waiting();
   /// Takes the oldest message that waits, or the newest positions when none does.
   void take_next();
-  /// The positions just after the message that take_next() took last; otherwise as newest().
-  void taken(const Kinematics& kinematics, JointPositions* positions);
 
   JointStateReport report();
 
@@ -86,22 +111,23 @@ class JointStateListener {
   };
 
   void receive(const ros::MessageEvent<const sensor_msgs::JointState>& event);
-  bool read(const sensor_msgs::JointState& message, const std::string& publisher);
+  bool use_message(const sensor_msgs::JointState& message, const std::string& publisher);
   std::string why_unusable(const sensor_msgs::JointState& message) const;
   void collect(const sensor_msgs::JointState& message, bool complains);
   void refuse(std::size_t joint, const std::string& reason);
   ros::Time counted_stamp(const ros::Time& stamp);
-  void use(const Stated& stated, const ros::Time& stamp);
-  void note_publisher(const Stated& stated, const ros::Time& stamp, const std::string& publisher);
-  void follow(std::size_t leader, double q, const ros::Time& stamp);
+  void use(const Stated& stated, const ros::Time& stamp, const std::string& publisher);
+  void follow(std::size_t leader, double q, const ros::Time& stamp, const std::string& publisher);
   void compare_with_leader(std::size_t joint);
-  void put_into_tf(std::size_t joint, double q, const ros::Time& stamp, bool is_static);
+  void put_into_tf(std::size_t joint, double q, const ros::Time& stamp,
+                   const std::string& publisher);
   void notice_clock_jump();
   void forget();
-  void copy(const JointPositions& from, const Kinematics& kinematics, JointPositions* positions);
   void drop(const std::string& problem, std::size_t count);
 
   TransformBuffer& buffer_;
+  const std::string prefix_;
+  const std::string urdf_;  ///< the name of who states the fixed joints
   const std::function<void()> on_state_;
   ros::Subscriber subscriber_;
 
@@ -109,8 +135,8 @@ class JointStateListener {
   std::shared_ptr<const Kinematics> kinematics_;
   std::unordered_map<std::string, std::size_t> index_;  ///< index of a joint by its name
   std::vector<std::vector<std::size_t>> led_by_;        ///< by joint: the joints that mimic it
-  JointPositionQueue positions_;
-  std::vector<PublisherTrack> tracks_;  ///< by joint
+  JointPositions newest_, taken_;
+  std::deque<JointPositions> waiting_;  ///< after each message that is not answered yet
   std::vector<Stated> stated_;          ///< the positions of the message being read
   std::vector<std::size_t> place_;      ///< by joint: its place in stated_; else kNowhere
   JointStateReport report_;

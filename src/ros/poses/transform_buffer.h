@@ -1,21 +1,22 @@
 #pragma once
 
 #include <geometry_msgs/TransformStamped.h>
-#include <ros/datatypes.h>
+#include <ros/message_event.h>
+#include <ros/node_handle.h>
 #include <ros/time.h>
 #include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
 
-#include <array>
 #include <atomic>
-#include <boost/weak_ptr.hpp>
 #include <chrono>
 #include <cstddef>
 #include <mutex>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
-#include "ros/poses/publisher_track.h"
+#include "ros/poses/frame_statements.h"
 
 namespace ist {
 
@@ -26,46 +27,37 @@ namespace ist {
 /// has sent two good ones, and goes to the status: also where others give the frame a pose. A
 /// static transform is sent once, so the reason of its refusal stays until another takes its place.
 /// The buffer also remembers which transforms were stamped ahead of the clock, so that their age
-/// counts from their receipt.
-///
-/// It notices which frames two publishers state differently: in two parents, at places that no
-/// motion explains (see PublisherTrack), or, where one of them is static, more than rounding apart.
-/// What a publisher says last counts, so that a correction is no dispute. A dispute ends when they
-/// agree, when the one has been silent for a second, or for three of its periods if that is longer,
-/// and with the connection of a static publisher. The static transform that is left counts then.
-/// Thread safe.
+/// counts from their receipt, and which frames two publishers state differently (see
+/// FrameStatements). Where a dispute ends, the static transform that is left counts. Thread safe.
 class TransformBuffer : public tf2::BufferCore {
  public:
   /// @param cache_time  how long transforms are kept
   explicit TransformBuffer(const ros::Duration& cache_time) : tf2::BufferCore(cache_time) {}
 
-  /// A node that states transforms.
-  struct Publisher {
-    Publisher(std::string name_of_node)
-        : name(std::move(name_of_node)) {}                       // NOLINT: a name will do
-    Publisher(const char* name_of_node) : name(name_of_node) {}  // NOLINT: likewise
-    Publisher(std::string name_of_node, const boost::shared_ptr<ros::M_string>& header)
-        : name(std::move(name_of_node)), connection(header), has_connection(header != nullptr) {}
+  /// Takes what comes on /tf and /tf_static, in the thread of the node handle's callback queue.
+  void subscribe(ros::NodeHandle nh);
 
-    std::string name;
-    /// The header of its connection, which roscpp frees with the connection.
-    boost::weak_ptr<ros::M_string> connection;
-    bool has_connection = false;  ///< false: it is there for good
+  /// Does not use what comes of these frames from now on, because joint states supply them. Static
+  /// transforms that differ from the URDF's are disputes all the same.
+  void ignore(const std::vector<std::string>& child_frames);
 
-    bool is_gone() const { return has_connection && connection.expired(); }
-  };
+  /// Forgets everything but static transforms if the ROS clock has jumped back since the last call
+  /// or message (a bag starts over). A transform from before that comes after it would be taken for
+  /// the newest, and the present ones refused as too old.
+  void notice_clock_jump();
+  void clear();
 
   /// Adds a transform, unless it is refused: numbers that are no rotation or not finite, no frame
   /// names, no stamp, a stamp more than a second ahead of the clock.
   /// @param publisher  that sent it
   /// @param now        the ROS clock's time
   /// @returns empty, or a sentence that says why the transform is not used
-  std::string add(const geometry_msgs::TransformStamped& transform, const Publisher& publisher,
-                  bool is_static, const ros::Time& now);
+  std::string add(const geometry_msgs::TransformStamped& transform,
+                  const TransformPublisher& publisher, bool is_static, const ros::Time& now);
 
   /// Compares a static transform that is not to be used with the static ones of its frame.
-  void compare(const geometry_msgs::TransformStamped& transform, const Publisher& publisher,
-               const ros::Time& now);
+  void compare(const geometry_msgs::TransformStamped& transform,
+               const TransformPublisher& publisher, const ros::Time& now);
 
   /// Forgets that a publisher states anything; its transforms stay.
   void withdraw(const std::string& publisher);
@@ -73,12 +65,9 @@ class TransformBuffer : public tf2::BufferCore {
   /// Ends the disputes that are over.
   void end_disputes(const ros::Time& now);
 
-  /// Forgets everything but static transforms.
-  void clear();
-
-  /// The last refusal of the last second, or else of a static transform whose place is still empty;
-  /// empty when there was none.
-  std::string last_refusal() const;
+  /// The last refusal of the last second, or else of a static transform whose place is still empty,
+  /// or ahead(); empty when there was none.
+  std::string problem() const;
   /// A sentence on the transform that is farthest ahead of the clock, where that is 50 ms or more;
   /// empty when there was none in the last second.
   std::string ahead() const;
@@ -100,45 +89,35 @@ class TransformBuffer : public tf2::BufferCore {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// What a publisher said last of one child frame.
-  struct Statement {
-    Publisher publisher;
-    bool is_static;
-    geometry_msgs::TransformStamped transform;
-    ros::Time received;
-    double silence = 0.0;  ///< [s] after which it says nothing any more; not of a static one
-  };
-
   /// Knowledge of the transforms of one child frame.
   struct Record {
     std::string parent;  ///< of the last transform, used or refused
     ros::Time newest;    ///< stamp of the newest transform
     double ahead = 0.0;  ///< [s] of the newest one's stamp at its receipt; may be negative
     ros::Time received;  ///< receipt of the newest transform
-    Clock::time_point ahead_time;
+    Clock::time_point ahead_until;
     std::string refusal, refused_publisher;
-    Clock::time_point refusal_time;
-    int good_since = 0;          ///< transforms of that publisher that were used since
-    bool refusal_stays = false;  ///< of a static transform, which is not sent again
-    PublisherTrack track;
-    std::vector<Statement> statements;  ///< by publisher, in the order of their first ones
-    std::string dispute;                ///< empty: none
-    std::array<std::string, 2> rivals;  ///< by the track, which disagree until then
-    ros::Time rivals_until;
+    Clock::time_point refused_until;  ///< the largest there is: of a static one, not sent again
+    int good_since = 0;               ///< transforms of that publisher that were used since
+    FrameStatements statements;
+
+    bool is_refused_for_good() const { return refused_until == Clock::time_point::max(); }
   };
 
-  std::string check(const geometry_msgs::TransformStamped& transform, bool is_static,
-                    const ros::Time& now) const;
+  void receive(const ros::MessageEvent<const tf2_msgs::TFMessage>& event, bool is_static);
+  bool is_ignored(const std::string& child_frame) const;
+  static std::string why_unusable(const geometry_msgs::TransformStamped& transform, bool is_static,
+                                  const ros::Time& now);
+  std::string note(const geometry_msgs::TransformStamped& transform,
+                   const TransformPublisher& publisher, bool is_static, const ros::Time& now,
+                   bool* is_new);
   std::string refuse(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
                      const std::string& fault, bool is_static);
-  static void note_good(const std::string& publisher, Record* record);
   void accept(const std::string& child);
-  void note_statement(const geometry_msgs::TransformStamped& transform, const Publisher& publisher,
-                      bool is_static, const ros::Time& now, Record* record);
-  static std::string why_disagreeing(const Statement& a, const Statement& b,
-                                     const std::array<std::string, 2>& rivals);
-  void compare_statements(const ros::Time& now, Record* record);
-  void set_dispute(const std::string& dispute, Record* record);
+  template <typename Change>
+  void change_statements(const Change& change, Record* record);
+  Record* find_or_make(const std::string& child);
+  void forget_moving();
   bool way_up(const std::string& end, const std::string& frame,
               std::vector<std::string>* way) const;
   std::vector<std::string> between(const std::string& fixed, const std::string& frame) const;
@@ -146,11 +125,14 @@ class TransformBuffer : public tf2::BufferCore {
   mutable std::mutex mutex_;                         // guards the members below
   std::unordered_map<std::string, Record> records_;  ///< by child frame, without a slash
   std::string last_refusal_;
-  std::atomic<std::size_t> lasting_refusals_{0};  ///< records whose refusal stays
-  std::atomic<Clock::time_point> last_refusal_time_{Clock::time_point()};
-  Clock::time_point skew_time_;
+  std::atomic<std::size_t> lasting_refusals_{0};  ///< records that are refused for good
+  std::atomic<Clock::time_point> refused_until_{Clock::time_point()};  ///< the last one
   bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
   std::atomic<std::size_t> disputes_{0};  ///< records with a dispute
+  ros::Time last_now_;
+  std::set<std::string> ignored_;
+
+  ros::Subscriber moving_, static_;
 };
 
 }  // namespace ist

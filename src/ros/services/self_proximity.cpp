@@ -105,7 +105,7 @@ void SelfProximity::take_model() {
   if (!model_->is_ready() || !model_->kinematics) return;  // pairs need all links
   query_ = std::make_unique<SelfQuery>(model_->robot, watched_pairs(), config_.query, is_stopped_);
   pose_source_ =
-      make_pose_source(*model_, config_, buffer_, joints_, JointPoseSource::Which::kNewest);
+      make_pose_source(*model_, config_, buffer_, joints_, JointStateListener::Which::kNewest);
   speeds_.assign(model_->robot->links.size(), ClosingSpeed());
 }
 
