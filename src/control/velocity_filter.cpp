@@ -204,11 +204,8 @@ struct VelocityFilter::Impl {
     Eigen::Map<Eigen::VectorXd>(answer.velocity.data(), joints) = x;
   }
 
-  void scale(const ConstraintRows& rows, Span<const double> q, FilterReason reason) {
-    bound_joints(q, rows.horizon);
-    const Factors allowed = factors(rows);
-    const bool moves = allowed.most > 0.0 && allowed.least <= allowed.most;
-    give(moves ? FilterStatus::kScaled : FilterStatus::kStopped, reason, allowed.most);
+  void scale(FilterReason reason) {
+    give(answer.scale > 0.0 ? FilterStatus::kScaled : FilterStatus::kStopped, reason, answer.scale);
   }
 
   void run(Span<const double> command, Span<const double> q, const ConstraintRows& rows,
@@ -221,6 +218,7 @@ struct VelocityFilter::Impl {
     answer.rows.clear();
     answer.joints.clear();
     answer.iterations = 0;
+    answer.scale = 0.0;
     const auto count = static_cast<std::size_t>(joints);
     const auto fault = [&](FilterReason reason) { give(FilterStatus::kFault, reason, 0.0); };
     if (command.size() != count || !is_finite(command)) return fault(FilterReason::kCommand);
@@ -228,17 +226,19 @@ struct VelocityFilter::Impl {
     if (!can_be_used(rows, joints)) return fault(FilterReason::kRows);
     target = Eigen::Map<const Eigen::VectorXd>(command.data(), joints);
     bound_joints(q, rows.horizon);
-    if (!bound_accelerations()) return scale(rows, q, FilterReason::kContradiction);
+    const Factors allowed = factors(rows);
+    if (allowed.least <= allowed.most) answer.scale = std::max(allowed.most, 0.0);
+    if (!bound_accelerations()) return scale(FilterReason::kContradiction);
     const auto outcome = solver.solve(rows, lower, upper, weights, target, end, &x);
     answer.iterations = solver.iterations();
     tell_active();
     if (outcome == NearestVelocity::Outcome::kContradiction) {
-      return scale(rows, q, FilterReason::kContradiction);
+      return scale(FilterReason::kContradiction);
     }
     x = x.cwiseMax(lower).cwiseMin(upper);
     hold_still(rows);
     if (outcome == NearestVelocity::Outcome::kOutOfTime || !is_met(rows)) {
-      return scale(rows, q, FilterReason::kTime);
+      return scale(FilterReason::kTime);
     }
     const bool is_free = answer.rows.empty() && answer.joints.empty();
     give(is_free ? FilterStatus::kFree : FilterStatus::kLimited, FilterReason::kNone, 1.0);

@@ -308,6 +308,53 @@ TEST(VelocityFilter, ScalesTheCommandWhenTheTimeIsOver) {
   EXPECT_LT(Inequalities(problem).excess(answer.velocity), 1e-8);
 }
 
+// The scale is the largest share of the command that meets all bounds: halving finds no other.
+TEST(VelocityFilter, ScaleIsTheLargestShareOfTheCommand) {
+  test::Rng rng(464);
+  int some = 0, none = 0;
+  for (int trial = 0; trial < test::scaled(5000); ++trial) {
+    const Problem problem = random_problem(&rng, 1 + test::below(&rng, 4), test::below(&rng, 12),
+                                           trial % 2 == 0 ? MetBy::kZero : MetBy::kUnknown);
+    VelocityFilter filter(problem.limits, problem.weights);
+    const double scale = filter.run(problem.command, problem.q, problem.rows).scale;
+    const Inequalities all(problem);
+    const auto excess = [&](double share) {
+      std::vector<double> velocity = problem.command;
+      for (double& one : velocity) one *= share;
+      return all.excess(velocity);
+    };
+    ASSERT_GE(scale, 0.0);
+    ASSERT_LE(scale, 1.0);
+    if (scale > 0.0) ASSERT_LT(excess(scale), 1e-9) << trial;
+    for (const double more : {1e-6, 1e-3, 0.1, 0.5, 1.0}) {
+      const double share = std::min(scale + more, 1.0);
+      if (share > scale) ASSERT_GT(excess(share), 0.0) << trial << ": " << scale << ", " << share;
+    }
+    ++(scale > 0.0 && scale < 1.0 ? some : none);
+  }
+  EXPECT_GT(some, test::scaled(1000));
+  EXPECT_GT(none, test::scaled(100));
+}
+
+// Inside the stop distance the way out is free, and nothing else; beside what is not known,
+// nothing.
+TEST(VelocityFilter, ScaleLetsTheRobotLeave) {
+  VelocityFilter filter({{1.0}, {}, {}, {}});
+  ConstraintRows rows = empty_rows(1, 1);
+  rows.G(0, 0) = 1.0;
+  rows.h[0] = 0.0;
+  EXPECT_EQ(filter.run({-0.5}, {0.0}, rows).scale, 1.0);
+  EXPECT_EQ(filter.run({0.5}, {0.0}, rows).scale, 0.0);
+  rows.h[0] = 0.1;
+  EXPECT_NEAR(filter.run({0.5}, {0.0}, rows).scale, 0.2, 1e-12);
+  rows.sweep(0, 0) = 1.0;
+  rows.sweep_limit[0] = 0.0;  // the link is UNKNOWN
+  EXPECT_EQ(filter.run({-0.5}, {0.0}, rows).scale, 0.0);
+  EXPECT_EQ(filter.run({std::nan("")}, {0.0}, rows).scale, 0.0);
+  rows.is_complete = false;
+  EXPECT_EQ(filter.run({-0.5}, {0.0}, rows).scale, 0.0);
+}
+
 TEST(VelocityFilter, RefusesLimitsThatContradict) {
   EXPECT_THROW(VelocityFilter({{1.0}, {1.0}, {0.0}, {}}), std::invalid_argument);
   EXPECT_THROW(VelocityFilter({{1.0}, {}, {0.0, 1.0}, {}}), std::invalid_argument);

@@ -13,7 +13,7 @@ import rospy
 from ist_proximity.msg import FilterState
 from proximity_testing import ProximityArray
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 SLIDES = """<robot name="slides">
@@ -43,7 +43,7 @@ class Filter:
 
     def __init__(self, namespace, **parameters):
         self.name = namespace + "/filter"
-        self.states, self.given = [], []
+        self.states, self.given, self.scales = [], [], []
         for name, value in parameters.items():
             rospy.set_param(self.name + "/" + name, value)
         kinds = {"std_msgs/Float64MultiArray": Float64MultiArray, "sensor_msgs/JointState": JointState}
@@ -51,6 +51,7 @@ class Filter:
         self._subscribers = [
             rospy.Subscriber(self.name + "/filter_state", FilterState, self.states.append),
             rospy.Subscriber(self.name + "/safe_command", self.kind, self.given.append),
+            rospy.Subscriber(self.name + "/speed_scale", Float64, lambda m: self.scales.append(m.data)),
         ]
         self.publisher = rospy.Publisher(self.name + "/command", self.kind, queue_size=1)
         self._log = tempfile.TemporaryFile()
@@ -103,7 +104,10 @@ class VelocityFilterTest(unittest.TestCase):
                 self.velocity = self.given_velocity(self.filter.given[-1])
             self.q = self.q + PERIOD * self.velocity
             self.nearest = min(self.nearest, WALL - RADIUS - self.q[0])
-        state = JointState(name=JOINTS, position=list(self.q))
+        self.send_joints(self.q)
+
+    def send_joints(self, q):
+        state = JointState(name=JOINTS, position=list(q))
         state.header.stamp = rospy.Time.now()
         self.joint_publisher.publish(state)
 
@@ -193,6 +197,55 @@ class VelocityFilterTest(unittest.TestCase):
         self.assertTrue(np.any(self.given_velocity(given[-1])))
         self.filter.process.terminate()
         pt.wait_until(lambda: not np.any(self.given_velocity(given[-1])), "0 at the end")
+
+    def wait_for_scale(self, low, high, what):
+        begin = len(self.filter.scales)
+        is_it = lambda: [s for s in self.filter.scales[begin:] if low <= s <= high]  # noqa: E731
+        pt.wait_until(is_it, "a scale of %g to %g: %s" % (low, high, what))
+
+    def test_speed_scale_of_a_command(self):
+        """The robot stands where it is: the scale is for others to use."""
+        self.q = np.array([WALL - RADIUS - 0.02, 0.0])
+        self.node.wait_for(lambda m: m.links[0].distance < 0.03, "the ball at the wall")
+        self.robot.function = lambda: self.send_joints(self.q)
+        self.start(0.2, 0.0)
+        self.wait_for_scale(0.0, 0.0, "an approach within the stop distance")
+        self.wanted = (-0.2, 0.0)
+        self.wait_for_scale(1.0, 1.0, "the retreat")
+        # The node's own scale does not let it leave; without a command it is passed on.
+        self.commands.paused = True
+        self.wait_for_scale(0.0, 0.0, "no command")
+        self.commands.paused = False
+        self.wait_for_scale(1.0, 1.0, "the retreat again")
+        # A joint's speed limit is a bound, too: 0.4 m/s of 0.8.
+        self.wanted = (0.0, 0.8)
+        self.wait_for_scale(0.0, 0.5, "a joint that is too fast")
+        # An approach from farther away, in part.
+        self.q = np.array([WALL - RADIUS - STOP - 0.1, 0.0])
+        self.wanted = (1.0, 0.0)
+        self.wait_for_scale(0.1, 0.9, "an approach from 0.1 m before the stop distance")
+        self.q = np.array([0.0, 0.0])
+        self.commands.paused = True
+        self.wait_for_scale(1.0, 1.0, "the node's own, far away")
+        self.commands.paused = False
+        # Bad input, and what is not known.
+        for wanted in ((np.nan, 0.0), (np.inf, 0.0)):
+            self.wanted = (0.1, 0.0)
+            self.wait_for_scale(1.0, 1.0, "a command that can be used")
+            self.wanted = wanted
+            self.wait_for_scale(0.0, 0.0, str(wanted))
+        self.wanted = (0.1, 0.0)
+        self.wait_for_scale(1.0, 1.0, "a command that can be used")
+        self.clouds.paused = True
+        self.wait_for_scale(0.0, 0.0, "a camera that is gone")
+        begin = len(self.filter.scales)
+        self.wanted = (-0.1, 0.0)
+        pt.wait_until(lambda: len(self.filter.scales) > begin + 30, "30 more scales")
+        self.assertFalse(np.any(self.filter.scales[begin + 5 :]))
+        self.clouds.paused = False
+        self.wait_for_scale(1.0, 1.0, "a camera that is there")
+        self.filter.process.terminate()
+        self.wait_for_scale(0.0, 0.0, "0 at the end")
 
     def test_faults(self):
         self.start(0.1, 0.0, command_type="std_msgs/Float64MultiArray")

@@ -50,6 +50,9 @@ struct FilterAnswer {
   std::vector<double> velocity;  ///< [rad/s, m/s] by joint; finite, whatever was given
   FilterStatus status = FilterStatus::kFault;  ///< what was made of the command
   FilterReason reason = FilterReason::kRows;   ///< why it is not the nearest velocity
+  /// 0 to 1: the largest share of the command that meets the rows, speed and position limits; 0
+  /// where there is none, and with a fault.
+  double scale = 0.0;
   /// Rows that hold the velocity back, or that contradict one another; some twice.
   std::vector<std::size_t> rows;
   std::vector<std::size_t> joints;  ///< joints that are at a limit of theirs, likewise

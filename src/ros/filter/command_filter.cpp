@@ -42,6 +42,12 @@ void set_stamp(const ros::Time& now, sensor_msgs::JointState* message) {
 }
 void set_stamp(const ros::Time&, std_msgs::Float64MultiArray*) {}
 
+void publish_scale(double scale, const ros::Publisher& publisher) {
+  std_msgs::Float64 message;
+  message.data = scale;
+  publish_message(publisher, message);
+}
+
 }  // namespace
 
 CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
@@ -50,11 +56,14 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
     description_ = config_.robot_description;
   }
   state_ = private_nh_.advertise<FilterState>("filter_state", 10);
+  scale_ = private_nh_.advertise<std_msgs::Float64>("speed_scale", 10);
   read_robot();
   answers_ = nh_.subscribe("proximity/proximity", 1, &CommandFilter::take_answers, this,
                            ros::TransportHints().tcpNoDelay());
   joints_ = nh_.subscribe("joint_states", 50, &CommandFilter::take_joints, this,
                           ros::TransportHints().tcpNoDelay());
+  node_scale_ = nh_.subscribe("proximity/speed_scale", 1, &CommandFilter::take_scale, this,
+                              ros::TransportHints().tcpNoDelay());
   if (config_.command_type == "std_msgs/Float64MultiArray") {
     subscribe<std_msgs::Float64MultiArray>();
   } else if (config_.command_type == "sensor_msgs/JointState") {
@@ -69,6 +78,7 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
 CommandFilter::~CommandFilter() {
   timer_.stop();
   command_.shutdown();
+  publish_scale(0.0, scale_);
   if (halt_) halt_("the filter ends");
 }
 
@@ -102,6 +112,7 @@ void CommandFilter::receive(const Message& message) {
   FilterState state;
   const std::vector<double> velocity = filter(command, &state);
   last_command_ = state.header.stamp;
+  publish_scale(given_scale_, scale_);
   give(velocity, &state, std::chrono::duration<double>(Clock::now() - begin).count());
   halt_ = [this, give, command](const std::string& reason) {
     FilterState none;
@@ -149,6 +160,11 @@ void CommandFilter::take_joints(const sensor_msgs::JointState& message) {
   if (history_) history_->add(message, ros::Time::now());
 }
 
+void CommandFilter::take_scale(const std_msgs::Float64& scale) {
+  newest_scale_ = scale.data >= 0.0 && scale.data <= 1.0 ? scale.data : 0.0;
+  newest_scale_came_ = ros::Time::now();
+}
+
 void CommandFilter::take_answers(const ist_proximity::ProximityArray::ConstPtr& answers) {
   clock_has_gone_back();
   if (!proximity_) return;
@@ -179,15 +195,20 @@ bool CommandFilter::clock_has_gone_back() {
   tf_.clear();
   if (history_) history_->clear();
   if (proximity_) proximity_->clear();
+  newest_scale_ = 0.0;
   if (halt_) halt_("the clock has gone back");
   return true;
 }
 
 void CommandFilter::on_timer() {
   if (!kinematics_) read_robot();
-  if (clock_has_gone_back() || !halt_) return;
-  const double age = seconds_between(last_command_, ros::Time::now());
-  if (age <= config_.command_timeout) return;
+  if (clock_has_gone_back()) return;
+  const ros::Time now = ros::Time::now();
+  const double age = seconds_between(last_command_, now);
+  if (halt_ && age <= config_.command_timeout) return;
+  const bool is_fresh = seconds_between(newest_scale_came_, now) <= config_.proximity_timeout;
+  publish_scale(is_fresh ? newest_scale_ : 0.0, scale_);
+  if (!halt_) return;
   halt_(format_text("the last command came %.2f s ago; ~command_timeout is %g s", age,
                     config_.command_timeout));
 }
@@ -239,6 +260,7 @@ std::vector<double> CommandFilter::filter(const JointCommand& command, FilterSta
   state->header.stamp = now;
   state->header.frame_id = kinematics_ ? kinematics_->bodies()[0] : "";
   state->command = command.velocity;
+  given_scale_ = 0.0;
   std::vector<double> velocity(command.joints.size(), 0.0);
   state->status_text = why_not(command, now);
   if (state->status_text.empty() && !history_->at(proximity_->answers().header.stamp, &q_then_)) {
@@ -250,6 +272,7 @@ std::vector<double> CommandFilter::filter(const JointCommand& command, FilterSta
     return velocity;
   }
   const FilterAnswer& answer = run(command, now);
+  given_scale_ = answer.scale;
   for (std::size_t i = 0; i < velocity.size(); ++i) {
     velocity[i] = answer.velocity[*column_of(command.joints[i])];
   }

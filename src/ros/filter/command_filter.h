@@ -3,6 +3,7 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <ros/ros.h>
 #include <sensor_msgs/JointState.h>
+#include <std_msgs/Float64.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
 
@@ -40,6 +41,7 @@ class CommandFilter {
   void read_robot();
   void take_answers(const ist_proximity::ProximityArray::ConstPtr& answers);
   void take_joints(const sensor_msgs::JointState& message);
+  void take_scale(const std_msgs::Float64& scale);
   void on_timer();
   bool clock_has_gone_back();
 
@@ -67,10 +69,13 @@ class CommandFilter {
   ConstraintRows rows_;
   std::vector<double> q_then_, q_now_, q_before_, q_column_, command_column_;
 
-  ros::Publisher safe_command_, state_;
-  ros::Subscriber command_, answers_, joints_;
+  ros::Publisher safe_command_, state_, scale_;
+  ros::Subscriber command_, answers_, joints_, node_scale_;
   ros::WallTimer timer_;
   ros::Time last_now_, last_command_;
+  double given_scale_ = 0.0;   ///< of the last command
+  double newest_scale_ = 0.0;  ///< the node's, without a command
+  ros::Time newest_scale_came_;
   /// Gives 0 for the joints of the last command, for a reason; empty: there has been none.
   std::function<void(const std::string&)> halt_;
 };
