@@ -191,6 +191,9 @@ void define_control(py::module_* module) {
           "'free': the command itself; 'limited': the nearest velocity; 'scaled': the command, "
           "slowed down; 'stopped': 0; 'fault': 0, because an input cannot be used")
       .def_property_readonly(
+          "scale", [](const PyFilterAnswer& a) { return a.answer.scale; },
+          "0 to 1: the largest share of the command that meets all bounds")
+      .def_property_readonly(
           "rows", [](const PyFilterAnswer& a) { return a.answer.rows; }, "rows that hold it back")
       .def("__str__", [](const PyFilterAnswer& a) { return a.text; });
 
