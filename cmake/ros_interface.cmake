@@ -37,8 +37,11 @@ add_message_files(DIRECTORY msg FILES
 add_service_files(DIRECTORY srv FILES
   AttachObject.srv
   DetachObject.srv
+  IgnoreLinks.srv
   ListLinkPairs.srv
-  QueryProximity.srv)
+  QueryProximity.srv
+  RemoveZone.srv
+  SetZone.srv)
 generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
 
 catkin_package(

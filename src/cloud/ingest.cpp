@@ -9,6 +9,7 @@
 
 #include "cloud/filters/one_place.h"
 #include "cloud/filters/self_filter.h"
+#include "cloud/filters/zone_filter.h"
 #include "cloud/index/near_region.h"
 #include "cloud/index/organized_cloud.h"
 #include "cloud/index/point_bvh_builder.h"
@@ -118,6 +119,7 @@ struct Ingest::Impl {
   RegionOfInterest region;
   PointBvhBuilder builder;
   SelfFilter self_filter;
+  ZoneFilter zones;
   NearRegion near;
   std::unique_ptr<ViewFilter> view;  // null: the self-filter drops all that is within its padding
   LookedBlocks looked;               // of the cloud that `view` has seen last
@@ -169,6 +171,10 @@ void Ingest::set_region_of_interest(const RegionOfInterest& region) {
   impl_->region = region;
 }
 
+void Ingest::set_zones(const std::vector<Zone>& zones, std::size_t kept) {
+  impl_->zones.set_zones(zones, kept);
+}
+
 void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FP, Span<const PosedSolid> robot,
                  double stamp, CloudSnapshot* snapshot, Span<const double> paddings) {
   const auto start = std::chrono::steady_clock::now();
@@ -197,28 +203,34 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FP, Span<cons
       on_robot->set_poses(robot, crop.X_FO, config.self_filter_padding, paddings);
     }
   }
+  if (!extent.is_zero()) extent.p_FS = X_FC.translation();
+  const ZoneFilter* zones = nullptr;
+  if (impl_->zones.is_active()) {
+    impl_->zones.begin_cloud(crop.X_FO, extent);
+    zones = &impl_->zones;
+  }
   IngestCounts counts;
   std::size_t kept = 0;
   if (organized) {
-    kept = index_organized(cloud, crop, on_robot, view, view != nullptr ? &impl_->looked : nullptr,
-                           &impl_->builder, &snapshot->index.bvh(), &counts);
+    kept = index_organized(cloud, crop, {on_robot, view, zones},
+                           view != nullptr ? &impl_->looked : nullptr, &impl_->builder,
+                           &snapshot->index.bvh(), &counts);
   } else {
     NearRegion* near = nullptr;
     if (on_robot != nullptr && std::isfinite(config.search_distance)) {
       near = &impl_->near;
       near->start(on_robot->links(), config.search_distance, stamp);
     }
-    kept = index_unorganized(cloud, crop, on_robot, near, &impl_->builder, &snapshot->index.bvh(),
-                             &counts);
+    kept = index_unorganized(cloud, crop, {on_robot, nullptr, zones}, near, &impl_->builder,
+                             &snapshot->index.bvh(), &counts);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -
                         counts.outside_region - static_cast<std::uint32_t>(kept);
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
-  counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
+  counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used - counts.in_zones;
   counts.at_one_place = points_at_one_place(cloud, crop);
   counts.infinite_is_free = cloud.from_rays;
-  if (!extent.is_zero()) extent.p_FS = X_FC.translation();
   snapshot->extent = extent;
   snapshot->X_FS = X_FC;
   snapshot->believed_range = std::sqrt(crop.believed_sq);

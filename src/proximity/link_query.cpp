@@ -98,8 +98,7 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
   if (!is_inside_regions()) search.prune(search.region_bound);
   bool stopped = false;
   for (std::size_t i = 0; i < clouds.size(); ++i) {
-    for_each_index(*clouds[i], static_cast<std::int32_t>(i), search.X_FL,
-                   [&](const auto& obstacles) { stopped = !run(obstacles) || stopped; });
+    for_each_index(clouds, i, [&](const auto& obstacles) { stopped = !run(obstacles) || stopped; });
   }
   // A search that was stopped may know nothing of what it left.
   const double least = -link_.context.deepest();

@@ -95,6 +95,13 @@ class LinkQuery {
   double answer_error(double distance) const;
   double extent() const;  ///< [m] no point of the link is farther from its origin
 
+  // Visits the indices of a cloud that holds obstacles for this link.
+  template <class Visit>
+  void for_each_index(SnapshotSpan clouds, std::size_t i, const Visit& visit) const {
+    if (!clouds[i]->is_for(link_.context.model->name)) return;
+    ist::for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, visit);
+  }
+
   template <class Obstacles>
   bool run(const Obstacles& obstacles);
   template <class Obstacles>

@@ -210,7 +210,7 @@ bool LinkQuery::for_each_extent(SnapshotSpan clouds, const Visit& visit, ExtentS
       ExtentMeasure<Obstacles> measure(obstacles, extent, cloud.box_extent, &link_, spheres);
       visited_all = visit(obstacles, &measure);
     };
-    for_each_index(cloud, static_cast<std::int32_t>(i), link_.search.X_FL, visit_index);
+    for_each_index(clouds, i, visit_index);
   }
   return visited_all;
 }
@@ -223,15 +223,14 @@ double LinkQuery::contact_bound(SnapshotSpan clouds, double points, double limit
     if (!has_extent(cloud)) continue;
     const LinkExtent extent = link_extent(cloud, link_);
     const double reach = std::max(limit + extent.largest_radius_within(limit), 0.0);
-    for_each_index(
-        cloud, static_cast<std::int32_t>(i), link_.search.X_FL, [&](const auto& obstacles) {
-          if constexpr (is_points<decltype(obstacles)>) {
-            largest = std::max(largest,
-                               largest_radius_near(obstacles, extent, link_.context.tree(), reach));
-          } else {
-            largest = std::max(largest, cloud.box_extent);
-          }
-        });
+    for_each_index(clouds, i, [&](const auto& obstacles) {
+      if constexpr (is_points<decltype(obstacles)>) {
+        largest =
+            std::max(largest, largest_radius_near(obstacles, extent, link_.context.tree(), reach));
+      } else {
+        largest = std::max(largest, cloud.box_extent);
+      }
+    });
   }
   return std::min(points - largest, region_bound(clouds, link_));
 }

@@ -36,13 +36,13 @@ void LinkQuery::warm_start(SnapshotSpan clouds, bool has_time) {
     measure_again(obstacles);
   };
   for (std::size_t i = 0; i < clouds.size(); ++i) {
-    for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, measure_last);
+    for_each_index(clouds, i, measure_last);
   }
   if (distance() < kInfinity || !has_time) return;
   // A new cloud has about the same obstacle about the same place, unless the link has left it.
   const auto measure_near = [&](const Eigen::Vector3d& p_FQ) {
     for (std::size_t i = 0; i < clouds.size(); ++i) {
-      for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL,
+      for_each_index(clouds, i,
                      [&](const auto& obstacles) { measure_near_place(obstacles, p_FQ); });
     }
   };

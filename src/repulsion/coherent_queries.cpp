@@ -1,6 +1,8 @@
 #include "internal/repulsion/coherent_queries.h"
 
 #include <algorithm>
+#include <iterator>
+#include <string>
 #include <utility>
 
 #include "internal/proximity/deadline.h"
@@ -24,6 +26,15 @@ CoherentQueries::CoherentQueries(std::shared_ptr<const RobotModel> model, const 
       answers_(model_->links.size()) {
   blends_.reserve(model_->links.size());
   for (std::size_t i = 0; i < model_->links.size(); ++i) blends_.emplace_back(i);
+}
+
+SnapshotSpan CoherentQueries::clouds_for(std::size_t link, SnapshotSpan clouds) {
+  const std::string& name = model_->links[link].name;
+  const auto is_for = [&name](const CloudSnapshot* cloud) { return cloud->is_for(name); };
+  if (std::all_of(clouds.begin(), clouds.end(), is_for)) return clouds;
+  clouds_.clear();
+  std::copy_if(clouds.begin(), clouds.end(), std::back_inserter(clouds_), is_for);
+  return clouds_;
 }
 
 void CoherentQueries::forget_repulsion() {

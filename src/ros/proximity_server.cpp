@@ -46,11 +46,15 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       spheres_(private_nh),
       diagnostics_(nh, without_slash(private_nh.getNamespace()), config),
       buffer_(ros::Duration(10.0)),
+      zones_(buffer_, config.pose_timeout, config.zones),
       loader_(config, nh),
       live_(private_nh, config),
-      contact_loader_(config, loader_, [this] {  // a request waits, or the node ends
-        return !model_thread_.queue()->isEmpty() || !model_thread_.is_running();
-      }) {
+      contact_loader_(config, loader_,
+                      [this] {  // a request waits, or the node ends
+                        return !model_thread_.queue()->isEmpty() || !model_thread_.is_running();
+                      }),
+      ignore_service_(private_nh, loader_),
+      zone_services_(private_nh, config_, buffer_, loader_, &zones_) {
   buffer_.subscribe(with_queue(nh, &pose_thread_));
   model_thread_.start("ist model", [this] {
     loader_.load_when_due();
@@ -127,7 +131,7 @@ void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Pu
     memories_.push_back(memory);
   }
   inputs_.push_back(std::make_shared<SensorSource>(
-      config, nh_, buffer_, filtered, memory,
+      config, nh_, buffer_, zones_, filtered, memory,
       [this](const ObstacleSource& source, const SourceSnapshot& fresh) {
         return warm_up_.run(source, fresh);
       }));
@@ -217,6 +221,7 @@ void ProximityServer::Impl::run_cycle() {
   notice_clock_jump(now);
   take_model();
   notice_standing_root();
+  notice_ignored_links(now);
   spheres_.repeat_when_due();
   const auto message = messages_.take();
   const std::string transform_problem = buffer_.problem();
@@ -239,6 +244,7 @@ void ProximityServer::Impl::run_cycle() {
     ++report_.cycles;
   }
   last_stamp_ = message->header.stamp;
+  message->ignored_links = ignored_;
   Stopwatch watch;
   const std::lock_guard<std::mutex> lock(report_mutex_);
   publish(message, true, live.speed_scale);
@@ -280,6 +286,11 @@ void ProximityServer::Impl::publish_diagnostics() {
        {report.parameter_problem, live_.without_effect(), counted_problem}) {
     note(Rank::kRemark, "query", remark, &report.findings);
   }
+  for (const std::string& remark : zone_services_.remarks()) {
+    note(Rank::kRemark, "query", remark, &report.findings);
+  }
+  report.zones = zones_.summary(ros::Time::now());
+  zone_services_.show();
   spheres_.show_finer(*loader_.state());
   if (joint_states_) {
     report.joint_states = joint_states_->report();

@@ -20,6 +20,7 @@
 #include "ros/cycle/scene_warm_up.h"
 #include "ros/input/source_memory.h"
 #include "ros/input/unknown_space.h"
+#include "ros/input/zone_store.h"
 #include "ros/model/contact_loader.h"
 #include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
@@ -32,10 +33,12 @@
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/transform_buffer.h"
 #include "ros/poses/usual_period.h"
+#include "ros/services/ignore_service.h"
 #include "ros/services/link_pair_service.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
 #include "ros/services/self_proximity.h"
+#include "ros/services/zone_services.h"
 #include "ros/status/cycle_report.h"
 #include "ros/status/diagnostics_publisher.h"
 #include "ros/trajectory/trajectory_watch.h"
@@ -71,6 +74,7 @@ class ProximityServer::Impl {
   void take_model();
   void choose_counted_links();
   void notice_standing_root();
+  void notice_ignored_links(const ros::Time& now);
   void refine_model(std::shared_ptr<const ModelState> model);
   void set_source_targets(const QueryConfig& query);
   double largest_extent() const;
@@ -88,6 +92,7 @@ class ProximityServer::Impl {
   DiagnosticsPublisher diagnostics_;
   CallbackThread pose_thread_;  ///< of tf and the joint states
   TransformBuffer buffer_;
+  ZoneStore zones_;
   SourceMemories memories_;
   SceneWarmUp warm_up_{sources_};  ///< used by the threads of the sources
   CloudSources sources_;
@@ -98,6 +103,8 @@ class ProximityServer::Impl {
   LiveParameters live_;
   ContactLoader contact_loader_;
   std::unique_ptr<ModelServices> model_services_;
+  IgnoreService ignore_service_;
+  ZoneServices zone_services_;
 
   StopSignal cycle_signal_;  ///< joint states are its events
   std::atomic<std::uint64_t> joint_states_received_{0};
@@ -117,7 +124,8 @@ class ProximityServer::Impl {
   MessagePool<ist_proximity::ProximityArray> messages_;
   double margin_ = 0.0;  ///< ~query/margin that the regions of interest are made with
   CountedLinks counted_;
-  bool root_stands_still_ = false;  ///< in a fixed frame that the URDF lacks
+  std::vector<std::string> ignored_;  ///< links that ~ignore_links leaves out
+  bool root_stands_still_ = false;    ///< in a fixed frame that the URDF lacks
   Clock::time_point next_root_check_;
   double region_radius_ = 0.0;  ///< [m] the largest of this robot
   ros::Time last_now_;

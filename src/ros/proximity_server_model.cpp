@@ -65,8 +65,10 @@ void ProximityServer::Impl::take_model() {
 /// Decides which links count in ~min_distance and ~speed_scale, and tells it where it is new.
 void ProximityServer::Impl::choose_counted_links() {
   const CountedLinks before = std::move(counted_);
-  counted_ = counted_links(*model_, config_, root_stands_still_);
-  const CountedLinks self = counted_links(*with_paired(model_), config_, root_stands_still_);
+  ServerConfig config = config_;
+  config.ignore_links.insert(config.ignore_links.end(), ignored_.begin(), ignored_.end());
+  counted_ = counted_links(*model_, config, root_stands_still_);
+  const CountedLinks self = counted_links(*with_paired(model_), config, root_stands_still_);
   summary_.set_links(counted_, self);
   marker_drawer_.set_counts(counted_.counts);
   std::string problem = self.problem;
@@ -101,6 +103,14 @@ void ProximityServer::Impl::notice_standing_root() {
                       stamp.isZero();
   if (stands == root_stands_still_) return;
   root_stands_still_ = stands;
+  choose_counted_links();
+}
+
+/// Links that ~ignore_links leaves out for a while.
+void ProximityServer::Impl::notice_ignored_links(const ros::Time& now) {
+  std::vector<std::string> names = ignore_service_.names(now);
+  if (names == ignored_) return;
+  ignored_ = std::move(names);
   choose_counted_links();
 }
 

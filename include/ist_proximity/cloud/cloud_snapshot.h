@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "ist_proximity/cloud/point_extent.h"
@@ -96,6 +97,7 @@ struct IngestCounts {
   std::uint32_t outside_region = 0;  ///< dropped: in range, but outside the region of interest
   std::uint32_t noise = 0;           ///< dropped by a noise filter that ran before
   std::uint32_t on_robot = 0;        ///< dropped by the self-filter
+  std::uint32_t in_zones = 0;        ///< left out by Ingest::set_zones()
   std::uint32_t used = 0;            ///< in the index
   /// Points in a range that counts that all have the same coordinates, where most points do: what
   /// a driver writes in place of a measurement, or a stuck one repeats. Else 0.
@@ -135,6 +137,14 @@ struct CloudSnapshot {
   ViewReport view;           ///< of a self-filter by view
   double stamp = 0.0;        ///< [s] time of acquisition
   double ingest_time = 0.0;  ///< [s] duration of Ingest::run()
+  /// Names of links for which nothing in it is an obstacle: ProximityQuery and what rests on it
+  /// leaves it out for them. Answers are kept by build: to be changed with `index` only.
+  std::vector<std::string> not_for;
+
+  /// Whether it holds obstacles for a link.
+  bool is_for(const std::string& link) const {
+    return std::find(not_for.begin(), not_for.end(), link) == not_for.end();
+  }
 };
 
 /// The clouds and maps of one query, in the order of their sources.

@@ -13,6 +13,7 @@
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/cloud/point_extent.h"
 #include "ist_proximity/cloud/view_filter.h"
+#include "ist_proximity/cloud/zone.h"
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 
@@ -158,6 +159,13 @@ class Ingest {
   /// Sets the region of interest from the next cloud on; at first there is none.
   /// @throws std::invalid_argument when it is not a sphere; the last one stays then
   void set_region_of_interest(const RegionOfInterest& region);
+
+  /// Sets the zones from the next cloud on; at first there are none. Points of other groups than
+  /// the one that is kept are left out, whole surfaces only: a point is in a zone when the sphere
+  /// that it stands for is (CloudSnapshot::extent). Of several zones that hold it, the first one
+  /// counts. Each point is kept for one group at least; what rounding leaves open, for two.
+  /// @param kept  a group, or Zone::kNone: the points that are in no zone
+  void set_zones(const std::vector<Zone>& zones, std::size_t kept = Zone::kNone);
 
   /// Drops points that are not finite, out of range or outside the region of interest, moves the
   /// rest to the fixed frame in double, removes the robot's own points and builds the index. The

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 
 #include "cloud/index/block_bounds.h"
 #include "cloud/index/block_reader.h"
@@ -14,15 +15,18 @@ namespace {
 // Reads an organized cloud block by block and hands its tiles to the builder.
 class OrganizedReader {
  public:
-  OrganizedReader(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                  ViewFilter* view, PointBvhBuilder* builder, IngestCounts* counts)
+  OrganizedReader(const RawCloud& cloud, const CropParameters& crop, const CloudFilters& filters,
+                  PointBvhBuilder* builder, IngestCounts* counts)
       : width_(cloud.width),
         height_(cloud.height),
         crop_(crop),
         blocks_(cloud, crop, counts),
-        on_robot_(on_robot),
-        view_(on_robot != nullptr ? view : nullptr),
-        builder_(*builder) {
+        on_robot_(filters.on_robot),
+        view_(on_robot_ != nullptr ? filters.view : nullptr),
+        zones_(filters.zones),
+        builder_(*builder),
+        counts_(*counts) {
+    SelfFilter* const on_robot = on_robot_;
     if (view_ != nullptr) {
       drop_ = [this](const PointTile& tile, const PaddedBox& /*box*/) { return viewed(tile); };
       drop_undecided_ = drop_;
@@ -34,6 +38,13 @@ class OrganizedReader {
         return on_robot->undecided_points_on_robot(tile);
       };
     }
+    if (zones_ == nullptr) return;
+    drop_in_zone_ = [this](const PointTile& tile, const PaddedBox& /*box*/) {
+      return with_zones(*zones_, tile, 0, &counts_);
+    };
+    drop_any_ = [this](const PointTile& tile, const PaddedBox& box) {
+      return with_zones(*zones_, tile, drop_(tile, box), &counts_);
+    };
   }
 
   std::size_t run() {
@@ -84,9 +95,31 @@ class OrganizedReader {
   }
 
   void add_block(const BlockBounds& block, bool is_whole, bool is_near_robot) {
+    using InZone = ZoneFilter::Verdict;
+    const InZone zone = zones_ != nullptr ? zones_->test(box_of(block)) : InZone::kNone;
+    if (zone == InZone::kAll) return leave_out(block);
     const std::uint32_t candidates = split_candidates(block);
-    if (is_whole && candidates == 0 && !is_near_robot && add_as_node(block)) return;
-    add_tiles(block, candidates, is_near_robot);
+    const bool is_filtered = is_near_robot || zone != InZone::kNone;
+    if (is_whole && candidates == 0 && !is_filtered && add_as_node(block)) return;
+    add_tiles(block, candidates, is_near_robot, zone != InZone::kNone);
+  }
+
+  void leave_out(const BlockBounds& block) {
+    for (std::size_t slot = 0; slot < kSlots; ++slot) leave_out(block.kept[slot]);
+  }
+  // @param kept  bit k: a point is in slot k
+  void leave_out(std::uint32_t kept) {
+    counts_.in_zones += static_cast<std::uint32_t>(std::bitset<32>(kept).count());
+  }
+
+  // What drops the points of a tile that one of the filters has left undecided.
+  // @param is_read  the tile is read as it is, in the box that the self-filter has tested last
+  const PointFilter& filter_for(SelfFilter::Verdict robot, bool is_in_zone, bool is_read) const {
+    static const PointFilter kDropNone;
+    const bool is_clear = robot == SelfFilter::Verdict::kClear;
+    if (is_in_zone) return is_clear ? drop_in_zone_ : drop_any_;
+    if (is_clear) return kDropNone;
+    return is_read ? drop_undecided_ : drop_;
   }
 
   // Shows the view filter the tiles that the self-filter cannot prove to be clear of the robot.
@@ -151,9 +184,10 @@ class OrganizedReader {
   // Adds the tiles one by one. Only those that have to be split, have holes, or are at the
   // self-filter's border are read.
   // @param candidates  bit k: the tile in slot k may have to be split
-  void add_tiles(const BlockBounds& block, std::uint32_t candidates, bool is_near_robot) {
+  void add_tiles(const BlockBounds& block, std::uint32_t candidates, bool is_near_robot,
+                 bool is_near_zone) {
     using Verdict = SelfFilter::Verdict;
-    static const PointFilter kDropNone;
+    using InZone = ZoneFilter::Verdict;
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
       const std::uint32_t kept = block.kept[slot];
       if (kept == 0) continue;
@@ -161,7 +195,13 @@ class OrganizedReader {
       const bool may_split = (candidates >> slot & 1U) != 0;
       const Verdict robot = is_near_robot ? judge(slot, kept, box) : Verdict::kClear;
       if (robot == Verdict::kOnRobot) continue;
-      if (kept == kWholeTile && !may_split && robot == Verdict::kClear) {
+      const InZone zone = is_near_zone ? zones_->test(box) : InZone::kNone;
+      if (zone == InZone::kAll) {
+        leave_out(kept);
+        continue;
+      }
+      const bool is_in_zone = zone == InZone::kSome;
+      if (kept == kWholeTile && !may_split && robot == Verdict::kClear && !is_in_zone) {
         builder_.add_lazy_tile(box, blocks_.first_pixel(slot));
         continue;
       }
@@ -169,10 +209,10 @@ class OrganizedReader {
         PointTile tile;
         blocks_.read_kept(slot, kept, &tile);
         add_parts(tile, (1U << static_cast<std::uint32_t>(tile.count)) - 1U, box,
-                  robot == Verdict::kClear ? kDropNone : drop_);
+                  filter_for(robot, is_in_zone, false));
       } else {
         blocks_.read_kept(slot, kept, builder_.next_tiles(1));
-        builder_.add_tile(box, robot == Verdict::kClear ? kDropNone : drop_undecided_);
+        builder_.add_tile(box, filter_for(robot, is_in_zone, true));
       }
     }
     builder_.end_group();
@@ -226,8 +266,10 @@ class OrganizedReader {
   BlockReader blocks_;
   SelfFilter* on_robot_;
   ViewFilter* view_;
-  PointFilter drop_, drop_undecided_;
+  const ZoneFilter* zones_;
+  PointFilter drop_, drop_undecided_, drop_in_zone_, drop_any_;
   PointBvhBuilder& builder_;
+  IngestCounts& counts_;
   BlockBounds bounds_;  // of read_block()
 };
 
@@ -236,15 +278,15 @@ class OrganizedReader {
 bool look_at_robot(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
                    ViewFilter* view, PointBvhBuilder* builder, LookedBlocks* looked) {
   looked->counts = {};
-  return OrganizedReader(cloud, crop, on_robot, view, builder, &looked->counts)
+  return OrganizedReader(cloud, crop, {on_robot, view, nullptr}, builder, &looked->counts)
       .look_at_robot(looked);
 }
 
-std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                            ViewFilter* view, const LookedBlocks* looked, PointBvhBuilder* builder,
-                            PointBvh* bvh, IngestCounts* counts) {
+std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop,
+                            const CloudFilters& filters, const LookedBlocks* looked,
+                            PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts) {
   builder->start_organized(crop.X_FO, cloud, crop.X_OS, bvh);
-  OrganizedReader reader(cloud, crop, on_robot, view, builder, counts);
+  OrganizedReader reader(cloud, crop, filters, builder, counts);
   if (looked != nullptr) *counts = looked->counts;
   const std::size_t kept = looked != nullptr ? reader.run_looked(*looked) : reader.run();
   builder->finish();

@@ -7,11 +7,21 @@
 #include "cloud/filters/crop.h"
 #include "cloud/filters/self_filter.h"
 #include "cloud/filters/view_filter.h"
+#include "cloud/filters/zone_filter.h"
 #include "cloud/index/block_bounds.h"
 #include "cloud/index/point_bvh_builder.h"
 #include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
+
+/// What is left out of an index. Each may be null.
+struct CloudFilters {
+  SelfFilter* on_robot = nullptr;
+  /// In place of all that is within the self-filter's padding, what the view filter, which
+  /// look_at_robot() has shown the cloud, takes for the robot.
+  ViewFilter* view = nullptr;
+  const ZoneFilter* zones = nullptr;
+};
 
 /// Whether a cloud is organized: an image of surfaces, in which neighbouring pixels are neighbours
 /// in space. Samples some blocks of pixels; the answer decides how fast the cloud is indexed, not
@@ -35,16 +45,13 @@ struct LookedBlocks {
 /// Reads an organized cloud once and builds its index without sorting points: squares of 4 x 4
 /// pixels become tiles, squares of 4 x 4 tiles become nodes. At depth discontinuities a tile is
 /// split, and tiles that no longer fill a node are grouped by where they are. Counts
-/// `not_a_number`, `infinite` and `outside_region`.
-/// @param on_robot  null: no self-filter
-/// @param view      null: the self-filter drops all that is within its padding; else only what the
-///                  view filter, which look_at_robot() has shown the cloud, takes for the robot
-/// @param looked    what look_at_robot() has found with the same crop; null without `view`
+/// `not_a_number`, `infinite`, `outside_region` and `in_zones`.
+/// @param looked    what look_at_robot() has found with the same crop; null without a view filter
 /// @param bvh  overwritten, its buffers reused
-/// @returns how many points are kept, before `on_robot` drops some
-std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                            ViewFilter* view, const LookedBlocks* looked, PointBvhBuilder* builder,
-                            PointBvh* bvh, IngestCounts* counts);
+/// @returns how many points are kept, before the filters drop some
+std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop,
+                            const CloudFilters& filters, const LookedBlocks* looked,
+                            PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts);
 
 /// Shows the view filter the part of a cloud that is near the robot; nothing is indexed.
 /// @param looked  overwritten

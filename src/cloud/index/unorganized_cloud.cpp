@@ -44,8 +44,8 @@ std::size_t take_sample(const RawCloud& cloud, const CropParameters& crop, Sampl
 }  // namespace
 
 std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
-                              SelfFilter* on_robot, NearRegion* region, PointBvhBuilder* builder,
-                              PointBvh* bvh, IngestCounts* counts) {
+                              const CloudFilters& filters, NearRegion* region,
+                              PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts) {
   const RawCloud points = flattened(cloud);
   Sample sample;
   PointCells& cells = builder->cells();
@@ -64,16 +64,32 @@ std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
   }
   PointFilter drop;
   BoxFilter may_drop, is_distant;
+  SelfFilter* const on_robot = filters.on_robot;
+  const ZoneFilter* const zones = filters.zones;
+  const auto is_in_zone = [zones](const PaddedBox& box) {
+    return zones != nullptr && zones->test(box) != ZoneFilter::Verdict::kNone;
+  };
   if (on_robot != nullptr) {
     drop = [on_robot](const PointTile& tile, const PaddedBox& box) {
       return on_robot->points_on_robot(tile, box);
     };
     may_drop = [on_robot](const PaddedBox& box) { return on_robot->begin_group(box); };
   }
+  if (zones != nullptr) {
+    drop = [zones, counts, on_robot = drop](const PointTile& tile, const PaddedBox& box) {
+      return with_zones(*zones, tile, on_robot ? on_robot(tile, box) : 0, counts);
+    };
+    may_drop = [is_in_zone, on_robot = may_drop](const PaddedBox& box) {
+      const bool is_near_robot = on_robot && on_robot(box);
+      return is_in_zone(box) || is_near_robot;
+    };
+  }
   if (region != nullptr) {
     cells.for_each_first([region](const CloudPoint& p) { region->add({p.x, p.y, p.z}); });
     region->finish();
-    is_distant = [region](const PaddedBox& box) { return region->is_outside(box); };
+    is_distant = [region, is_in_zone](const PaddedBox& box) {
+      return region->is_outside(box) && !is_in_zone(box);
+    };
   }
   builder->build_from_cells(crop.X_FO, drop, may_drop, is_distant, bvh);
   return kept;

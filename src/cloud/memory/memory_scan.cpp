@@ -14,16 +14,14 @@ namespace {
 // Rays are cut a little before the largest range, so that rounding lets none be longer.
 constexpr double kCut = 1.0 - 1e-6;
 
-// By number in the message: whether the snapshot holds the point.
-std::vector<bool> points_in(const CloudSnapshot& snapshot, std::size_t count) {
-  std::vector<bool> kept(count, false);
+// Notes the points of a snapshot, by number in the message.
+void note_points(const CloudSnapshot& snapshot, std::vector<bool>* kept) {
   PointTile scratch;
   const PointBvh& points = snapshot.index.bvh();
   for (std::size_t i = 0; i < points.tile_count(); ++i) {
     const PointTile& tile = points.tile(i, &scratch);
-    for (int k = 0; k < tile.count; ++k) kept[tile.id[k]] = true;
+    for (int k = 0; k < tile.count; ++k) (*kept)[tile.id[k]] = true;
   }
-  return kept;
 }
 
 // The points of a row, in the sensor frame.
@@ -44,12 +42,14 @@ void read_row(const RawCloud& cloud, std::size_t row, Eigen::Matrix3Xd* points) 
 
 void read_memory_scan(const RawCloud& cloud, const CloudSnapshot& snapshot,
                       const Eigen::Isometry3d& X_MS, double min_range, double max_range,
-                      MemoryScan* scan) {
+                      MemoryScan* scan, Span<const CloudSnapshot> in_zones) {
   scan->origin = X_MS.translation().cast<float>();
   scan->stamp = snapshot.stamp;
   scan->hits.clear();
   scan->free_ends.clear();
-  const std::vector<bool> kept = points_in(snapshot, cloud.size());
+  std::vector<bool> kept(cloud.size(), false);
+  note_points(snapshot, &kept);
+  for (const CloudSnapshot& zone : in_zones) note_points(zone, &kept);
   Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(cloud.width));
   for (std::size_t row = 0; row < cloud.height; ++row) {
     read_row(cloud, row, &points);

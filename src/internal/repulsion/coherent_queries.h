@@ -34,8 +34,10 @@ class CoherentQueries {
   RepulsiveWrench repel(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                         const LinkProximity& proximity, const RepulsionConfig& config,
                         TimePoint end = TimePoint::max()) {
-    return blends_[link].update(repulsion_, X_FL, clouds, proximity, config, end);
+    return blends_[link].update(repulsion_, X_FL, clouds_for(link, clouds), proximity, config, end);
   }
+  /// The clouds that hold obstacles for a link; valid until the next call.
+  SnapshotSpan clouds_for(std::size_t link, SnapshotSpan clouds);
   /// The next repulsion of each link is computed anew.
   void forget_repulsion();
 
@@ -56,8 +58,9 @@ class CoherentQueries {
   std::shared_ptr<const RobotModel> model_;
   ProximityQuery query_;
   Repulsion repulsion_;
-  std::vector<KeptRepulsion> blends_;   ///< by link
-  std::vector<LinkProximity> answers_;  ///< of warm_up()
+  std::vector<KeptRepulsion> blends_;         ///< by link
+  std::vector<LinkProximity> answers_;        ///< of warm_up()
+  std::vector<const CloudSnapshot*> clouds_;  ///< of clouds_for()
 };
 
 }  // namespace ist

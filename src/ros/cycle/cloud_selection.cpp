@@ -73,10 +73,11 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       surfaces_ = selected_[i]->surfaces;
       if (!selected_[i]->cloud.boxes) continue;  // it has no octomap
     }
-    clouds_.push_back(&selected_[i]->cloud);
-    cloud_sources_.push_back(static_cast<int>(i));
+    add_clouds(*selected_[i], &clouds_);
     const SourceReport& report = status->sources[i];
-    cloud_stands_still_.push_back(report.is_file || report.is_memory || std::isinf(report.timeout));
+    cloud_sources_.resize(clouds_.size(), static_cast<int>(i));
+    cloud_stands_still_.resize(clouds_.size(),
+                               report.is_file || report.is_memory || std::isinf(report.timeout));
     const ros::Time& stamp = selected_[i]->stamp;
     if (report.is_file || report.is_memory || selected_[i]->surfaces) continue;
     if (oldest_stamp_.isZero() || stamp < oldest_stamp_) oldest_stamp_ = stamp;
@@ -101,13 +102,26 @@ const SourceSnapshot* CloudSelection::newest(const CloudSources& sources, std::s
 ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer) const {
   const auto cloud = static_cast<std::size_t>(answer.source);
   if (answer.source < 0 || cloud >= clouds_.size()) return {};
-  return {cloud_sources_[cloud], obstacles_key({clouds_[cloud]}), clouds_[cloud]->stamp,
-          cloud_stands_still_[cloud]};
+  // What is in zones is of the same measurement.
+  const int source = cloud_sources_[cloud];
+  const CloudSnapshot& whole = selected_[static_cast<std::size_t>(source)]->cloud;
+  return {source, obstacles_key({&whole}), whole.stamp, cloud_stands_still_[cloud]};
 }
 
 int CloudSelection::source_of(const LinkProximity& answer) const {
   const auto cloud = static_cast<std::size_t>(answer.source);
   return answer.source < 0 || cloud >= clouds_.size() ? -1 : cloud_sources_[cloud];
+}
+
+void CloudSelection::list_zones(std::vector<std::string>* names) const {
+  names->clear();
+  for (const SourceSnapshot* snapshot : selected_) {
+    if (!snapshot) continue;
+    for (const auto& zone : snapshot->zones) {
+      const std::string& name = zone->config().name;
+      if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
+    }
+  }
 }
 
 void CloudSelection::exclude_unfiltered(std::vector<bool>* links) const {

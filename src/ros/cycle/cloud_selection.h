@@ -49,12 +49,14 @@ class CloudSelection {
   const std::vector<const SourceSnapshot*>& selected() const { return selected_; }
   /// The stamp of the oldest selected cloud, map files aside; zero when there is none.
   ros::Time oldest_stamp() const { return oldest_stamp_; }
-  /// By cloud: the number of its source.
+  /// By cloud: the number of its source; the clouds of a source follow each other.
   const std::vector<int>& cloud_sources() const { return cloud_sources_; }
   /// The selected cloud that holds the nearest point of an answer.
   ClosingSpeed::Nearest nearest(const LinkProximity& answer) const;
   /// The number of that cloud's source; -1: no point is near.
   int source_of(const LinkProximity& answer) const;
+  /// The zones that have left points out of the selected clouds, each once.
+  void list_zones(std::vector<std::string>* names) const;
   /// Makes links false whose own points the self-filter left in a selected cloud: they would be
   /// found touching themselves.
   void exclude_unfiltered(std::vector<bool>* links) const;

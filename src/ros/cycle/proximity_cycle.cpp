@@ -93,6 +93,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   message->cloud_stamp = selection_.oldest_stamp();
   message->unfinished = static_cast<std::uint32_t>(status_input_.deadline.unfinished);
   fill_links(message);
+  selection_.list_zones(&message->zones);
   findings_ = find_all(status_input_, now.toSec());
   status_ = decide(findings_, status_input_.clock_runs);
   fill_status(status_input_, status_, message);
@@ -144,6 +145,8 @@ void ProximityCycle::take_warm_queries() {
 void ProximityCycle::note_asked(const LiveConfig& config) {
   if (warm_up_ == nullptr) return;
   asked_.sources = selection_.cloud_sources();
+  asked_.sources.erase(std::unique(asked_.sources.begin(), asked_.sources.end()),
+                       asked_.sources.end());
   asked_.X_FL = poses_.X_FL;
   asked_.known = known_;
   asked_.query = config.query;
@@ -327,8 +330,8 @@ Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config, T
   ContactVolume volume;
   const bool is_known = result.state == LinkState::kContact && body != nullptr;
   if (is_known) {
-    volume =
-        contact_volume(packed_->links[link], *body, poses_.X_FL[link], selection_.clouds(), end);
+    volume = contact_volume(packed_->links[link], *body, poses_.X_FL[link],
+                            queries_->clouds_for(link, selection_.clouds()), end);
     DeadlineCost& cost = status_input_.deadline;
     if (volume.known < 1.0) ++cost.no_penetration;
     cost.least_known = std::min(cost.least_known, volume.known);

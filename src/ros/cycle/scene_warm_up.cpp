@@ -93,7 +93,7 @@ bool SceneWarmUp::select_clouds(const ObstacleSource& source, const SourceSnapsh
       snapshot = share(one);
     }
     if (snapshot == nullptr) return false;
-    clouds_.push_back(&snapshot->cloud);
+    add_clouds(*snapshot, &clouds_);
   }
   return is_part;
 }

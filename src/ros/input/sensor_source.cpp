@@ -34,16 +34,19 @@ std::string clock_difference(const Measurement& measurement) {
 }  // namespace
 
 SensorSource::SensorSource(const SourceConfig& config, ros::NodeHandle nh,
-                           const TransformBuffer& buffer, const ros::Publisher& filtered,
-                           std::shared_ptr<SourceMemory> memory, WarmUp warm_up)
+                           const TransformBuffer& buffer, const ZoneStore& zones,
+                           const ros::Publisher& filtered, std::shared_ptr<SourceMemory> memory,
+                           WarmUp warm_up)
     : Source(config, nh, buffer, filtered.getTopic()),
       is_map_(config.type == SourceType::kMap),
       noun_(noun(config.type)),
+      zones_(zones),
       filtered_(filtered),
       memory_(std::move(memory)),
       warm_up_(std::move(warm_up)),
       placer_(config_, buffer),
-      ingest_(ingest_config(config)) {
+      ingest_(ingest_config(config)),
+      zone_ingest_(ingest_config(config)) {
   nh.setCallbackQueue(&queue_);
   if (config.file.empty()) {
     subscribers_ = subscribe(config, &nh, [this](const std::function<Measurement()>& read) {
@@ -275,7 +278,11 @@ std::string SensorSource::use(const Measurement& measurement) {
 void SensorSource::take_in(const Measurement& measurement, const Placement& placement,
                            bool is_shown, SourceSnapshot* snapshot) {
   ingest_.set_region_of_interest(is_shown ? RegionOfInterest() : target_.region);
+  PlacedZones zones;
+  if (config_.has_zones()) zones = zones_.place(target_.fixed_frame, measurement.header.stamp);
+  ingest_.set_zones(zones.zones);
   measurement.take_in(placement, &ingest_, &snapshot->cloud);
+  take_in_zones(measurement, placement, zones, snapshot);
   if (is_map_) snapshot->cloud.box_extent = map_extent(config_);
   snapshot->stamp = measurement.header.stamp;
   snapshot->counts_from = measurement.counts_from();
@@ -286,6 +293,25 @@ void SensorSource::take_in(const Measurement& measurement, const Placement& plac
   snapshot->generation = target_.generation;
   snapshot->memory = memory_ ? memory_->take(measurement, placement, target_, *snapshot) : nullptr;
   in_use_ = snapshot->stamp;
+}
+
+/// Takes in the points that zones have left out of the cloud: for the links that are not named, and
+/// for a memory, which remembers them.
+void SensorSource::take_in_zones(const Measurement& measurement, const Placement& placement,
+                                 const PlacedZones& zones, SourceSnapshot* snapshot) {
+  const bool is_empty = snapshot->cloud.counts.in_zones == 0;
+  snapshot->zones = is_empty ? decltype(zones.live)() : zones.live;
+  snapshot->in_zones.resize(is_empty ? 0 : zones.links.size());
+  if (is_empty) return;
+  zone_ingest_.set_region_of_interest(target_.region);
+  for (std::size_t group = 0; group < zones.links.size(); ++group) {
+    CloudSnapshot& cloud = snapshot->in_zones[group];
+    cloud.not_for = zones.links[group];
+    cloud.index.clear();
+    if (cloud.not_for.empty() && !memory_) continue;
+    zone_ingest_.set_zones(zones.zones, group);
+    measurement.take_in(placement, &zone_ingest_, &cloud);
+  }
 }
 
 /// Hands a snapshot to queries. A warm-up that fails makes the next answer slower, and no cloud is

@@ -13,6 +13,7 @@
 #include "ros/input/placer.h"
 #include "ros/input/source.h"
 #include "ros/input/source_memory.h"
+#include "ros/input/zone_store.h"
 
 namespace ist {
 
@@ -38,12 +39,13 @@ class SensorSource : public Source {
 
   /// @param nh        in the namespace that the topic is relative to
   /// @param buffer    outlives this
+  /// @param zones     outlives this
   /// @param filtered  publisher of what queries see, used while it has subscribers
   /// @param memory    what the source remembers; null: nothing
   /// @param warm_up   called by the source's thread with each cloud before queries get it
   SensorSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer,
-               const ros::Publisher& filtered, std::shared_ptr<SourceMemory> memory,
-               WarmUp warm_up);
+               const ZoneStore& zones, const ros::Publisher& filtered,
+               std::shared_ptr<SourceMemory> memory, WarmUp warm_up);
   ~SensorSource() override { stop(); }
 
   void report(SourceReport* report) override;
@@ -62,18 +64,21 @@ class SensorSource : public Source {
   std::string use(const Measurement& measurement);
   void take_in(const Measurement& measurement, const Placement& placement, bool is_shown,
                SourceSnapshot* snapshot);
+  void take_in_zones(const Measurement& measurement, const Placement& placement,
+                     const PlacedZones& zones, SourceSnapshot* snapshot);
   void publish(const SourceSnapshot& snapshot, bool is_shown);
   void note_view(const Placement& placement, const ViewReport& view);
 
   const bool is_map_;
   const std::string noun_;  ///< the word for one message
+  const ZoneStore& zones_;
   ros::Publisher filtered_;
   const std::shared_ptr<SourceMemory> memory_;  ///< null: nothing is remembered
   const WarmUp warm_up_;
 
   // Used by the source's thread alone.
   Placer placer_;
-  Ingest ingest_;
+  Ingest ingest_, zone_ingest_;  ///< the latter of what is in zones
   MeasurementQueue waiting_;
   std::shared_ptr<const Measurement> last_map_;
   bool map_is_new_ = false;    ///< last_map_ is not in use with this model yet

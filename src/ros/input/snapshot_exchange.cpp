@@ -20,11 +20,28 @@ bool is_unused(const SnapshotPtr& snapshot) {
 void empty(SourceSnapshot* snapshot) {
   snapshot->cloud.index.clear();
   snapshot->cloud.boxes.reset();
+  for (CloudSnapshot& cloud : snapshot->in_zones) cloud.index.clear();
   snapshot->memory.reset();
   snapshot->model.reset();
 }
 
 }  // namespace
+
+void add_clouds(const SourceSnapshot& snapshot, std::vector<const CloudSnapshot*>* clouds) {
+  clouds->push_back(&snapshot.cloud);
+  for (const CloudSnapshot& cloud : snapshot.in_zones) {
+    if (!cloud.index.empty() && !cloud.not_for.empty()) clouds->push_back(&cloud);
+  }
+}
+
+std::string ended_zone(const SourceSnapshot& snapshot, const ros::Time& now) {
+  for (const std::shared_ptr<const LiveZone>& zone : snapshot.zones) {
+    if (zone->is_on(now)) continue;
+    return "zone '" + zone->config().name +
+           "' has left points out of it and has ended: the next one is waited for";
+  }
+  return "";
+}
 
 SourceSnapshot& SnapshotExchange::writable() {
   SnapshotPtr& back = channel_.back();

@@ -12,6 +12,7 @@
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/proximity/world_query.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "ros/input/zone_store.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
@@ -33,11 +34,22 @@ struct SourceSnapshot {
   std::vector<Lag> lags;
   /// The obstacles that the source remembers and the cloud does not show; null: none.
   std::shared_ptr<const SourceSnapshot> memory;
+  /// By group of the zones: what it holds of the cloud's points, which are no obstacles for the
+  /// links in CloudSnapshot::not_for. That of all links holds points for a memory alone.
+  std::vector<CloudSnapshot> in_zones;
+  /// The zones that have left points out; empty: none has.
+  std::vector<std::shared_ptr<const LiveZone>> zones;
   /// A known world, and the surfaces of the model's links; null: a cloud. The boxes of the cloud
   /// belong to the world then.
   PosedWorld world;
   std::shared_ptr<const RobotSurfaces> surfaces;
 };
+
+/// Appends the clouds of a snapshot that hold obstacles.
+void add_clouds(const SourceSnapshot& snapshot, std::vector<const CloudSnapshot*>* clouds);
+
+/// Says which zone has left points out of a snapshot and does not hold any more; empty: all do.
+std::string ended_zone(const SourceSnapshot& snapshot, const ros::Time& now);
 
 /// Hands the snapshots of one source from its thread to the threads that query.
 class SnapshotExchange {

@@ -81,7 +81,9 @@ const SourceSnapshot* Source::newest(const SnapshotRequest& request) {
     original_ = snapshot;
     placed_ = *snapshot;
   }
-  std::string problem = is_placed_when_asked_
+  std::string ended = ended_zone(*snapshot, ros::Time::now());
+  std::string problem = !ended.empty() ? std::move(ended)
+                        : is_placed_when_asked_
                             ? place(request, &placed_)
                             : buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame);
   std::string doubt = doubt_of_place(*snapshot);
@@ -95,6 +97,7 @@ const SourceSnapshot* Source::newest(const SnapshotRequest& request) {
 std::shared_ptr<const SourceSnapshot> Source::share(const SnapshotRequest& request) {
   std::shared_ptr<const SourceSnapshot> snapshot = exchange_.share();
   if (!is_current(snapshot.get(), request.model)) return nullptr;
+  if (!ended_zone(*snapshot, ros::Time::now()).empty()) return nullptr;
   if (!is_placed_when_asked_) {
     const bool is_disputed = !buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame).empty();
     return is_disputed ? nullptr : snapshot;

@@ -245,7 +245,7 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
   region_M.center_F = X_MF_ * target.region.center_F;
   map_.set_region(region_M);
   read_memory_scan(measurement.points, cloud.cloud, X_MF_ * cloud.cloud.X_FS,
-                   config_.ingest.min_range, map_.config().max_range, &scan_);
+                   config_.ingest.min_range, map_.config().max_range, &scan_, cloud.in_zones);
   map_.insert(scan_);
   told_next_.unplaced.clear();
   stamp_ = cloud.cloud.stamp;

@@ -42,7 +42,9 @@ void draw_mesh(const TriangleMesh& mesh, const Eigen::Isometry3d& X, Marker* mar
   }
 }
 
-void draw(const Shape& shape, const Eigen::Isometry3d& X, Marker* marker) {
+}  // namespace
+
+void draw_shape(const Shape& shape, const Eigen::Isometry3d& X, Marker* marker) {
   set_pose(X, marker);
   if (const auto* box = std::get_if<Box>(&shape)) {
     marker->type = Marker::CUBE;
@@ -58,8 +60,6 @@ void draw(const Shape& shape, const Eigen::Isometry3d& X, Marker* marker) {
     draw_mesh(std::get<TriangleMesh>(shape), X, marker);
   }
 }
-
-}  // namespace
 
 visualization_msgs::MarkerArray world_markers(
     const KnownWorld& world, const std::function<std::string(const std::string&)>& frame_of) {
@@ -80,7 +80,7 @@ visualization_msgs::MarkerArray world_markers(
       marker.color.r = marker.color.g = 0.6F;
       marker.color.b = 0.65F;
       marker.color.a = 0.5F;
-      draw(element.shape, object.X_BO * element.X_LE, &marker);
+      draw_shape(element.shape, object.X_BO * element.X_LE, &marker);
       array.markers.push_back(std::move(marker));
     }
   }

@@ -373,7 +373,7 @@ std::vector<Parameter> object_parameters(const std::string& at, WrittenObject* w
           row(at + "position", Numbers{written->position.data(), 3}, position),
           row(at + "rpy", Numbers{written->rpy.data(), 3}, {"rad", -100.0, 100.0},
               "Roll, pitch and yaw. In its place, orientation: [x, y, z, w]."),
-          row(at + "margin", &object.margin, kMargin)},
+          row(at + "margin", &object.margin, kMargin)},  // the last one: zones have none
          &table);
   return table;
 }

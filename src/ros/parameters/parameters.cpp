@@ -131,6 +131,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
         "away is measured; ~max_distance is used");
   }
   config.sources = read_sources(&reader);
+  config.zones = read_zones(&reader);
   for (SourceConfig& source : config.sources) {
     source.ingest.search_distance = config.query.max_distance;
   }

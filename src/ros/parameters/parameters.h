@@ -21,6 +21,7 @@
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/parameters/source_config.h"
+#include "ros/parameters/zone_config.h"
 
 namespace ist {
 
@@ -106,6 +107,7 @@ struct ServerConfig : LiveConfig {
   bool fixed_links_count = false;  ///< ~min_distance/fixed_links: links that cannot move count too
   bool speed_scale_enabled = true;
   std::vector<SourceConfig> sources;
+  std::vector<ZoneConfig> zones;
   UnknownSpace unknown_space = UnknownSpace::kFree;  ///< others need a memory
 };
 

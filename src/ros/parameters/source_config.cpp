@@ -22,4 +22,9 @@ bool SourceConfig::is_permanent() const {
   return stays && (!file.empty() || std::isinf(timeout));
 }
 
+bool SourceConfig::has_zones() const {
+  const bool measures = type != SourceType::kMap && type != SourceType::kWorld;
+  return measures && !std::isinf(timeout) && ingest.self_filter_mode != SelfFilterMode::kView;
+}
+
 }  // namespace ist

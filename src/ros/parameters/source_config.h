@@ -93,6 +93,9 @@ struct SourceConfig {
   /// Whether a message stays valid for ever and survives jumps of the clock: a map from a file, a
   /// map with an infinite timeout, and the same of a known world.
   bool is_permanent() const;
+  /// Whether zones hold for its points: those of a sensor that get stale, as a zone does, and that
+  /// are in one place, whatever a self-filter by view makes of it.
+  bool has_zones() const;
 };
 
 }  // namespace ist

@@ -15,4 +15,8 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader);
 /// @param at  "sources/NAME/"
 void read_world(ParameterReader* reader, const std::string& at, SourceConfig* source);
 
+/// Reads a shape with its sizes, its place and its frame.
+/// @param at  "zones/NAME/"
+void read_placed_shape(ParameterReader* reader, const std::string& at, WorldObjectConfig* config);
+
 }  // namespace ist

@@ -57,10 +57,12 @@ std::vector<GeometryElement> geometry_of(const std::string& shape, const Written
   return {element};
 }
 
-void read_object(ParameterReader* reader, const std::string& at, WorldObjectConfig* config) {
+void read_object(ParameterReader* reader, const std::string& at, bool has_margin,
+                 WorldObjectConfig* config) {
   WrittenObject written;
   reader->read(object_parameters(at, &written, config).front());  // the others depend on the shape
-  const std::vector<Parameter> rows = object_parameters(at, &written, config);
+  std::vector<Parameter> rows = object_parameters(at, &written, config);
+  if (!has_margin) rows.pop_back();
   reader->read_all(rows);
   require_sizes(reader, at, rows, config->mesh);
   config->object.X_BO = read_pose(reader, at, written);
@@ -86,11 +88,15 @@ void read_objects(ParameterReader* reader, const std::string& at, WorldConfig* w
     object.name = name;
     object.frame = world->frame_id;
     object.margin = world->margin;
-    read_object(reader, at + "objects/" + name + "/", &world->objects.back());
+    read_object(reader, at + "objects/" + name + "/", true, &world->objects.back());
   }
 }
 
 }  // namespace
+
+void read_placed_shape(ParameterReader* reader, const std::string& at, WorldObjectConfig* config) {
+  read_object(reader, at, false, config);
+}
 
 void read_world(ParameterReader* reader, const std::string& at, SourceConfig* source) {
   WorldConfig& world = source->world;

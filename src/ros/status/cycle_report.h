@@ -58,6 +58,7 @@ struct CycleReport {
   double min_distance = 0.0;         ///< [m] as on ~min_distance; NaN: not known
   std::string speed_scale;           ///< the scale, the rule and the link; empty: not enabled
   std::string counted_links;         ///< which links do not count in both, and why
+  std::string zones;                 ///< as ZoneStore::summary()
   std::size_t query_memory = 0;      ///< [bytes] of the cycle's query
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
 

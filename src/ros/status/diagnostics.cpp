@@ -68,6 +68,7 @@ void add_source_counts(const SourceReport& source, double rate, double now,
     add_value("points received", source.counts.received, status);
     add_value("points used", source.counts.used, status);
     add_value("points on the robot", source.counts.on_robot, status);
+    add_value("points in zones", source.counts.in_zones, status);
     add_value("points out of range", source.counts.out_of_range, status);
     add_value("points outside the region of interest", source.counts.outside_region, status);
     if (source.counts.noise > 0) add_value("points taken for noise", source.counts.noise, status);
@@ -240,6 +241,7 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   if (!report.counted_links.empty()) {
     add_value("links left out", report.counted_links, &status);
   }
+  if (!report.zones.empty()) add_value("zones", report.zones, &status);
   add_value("live parameters",
             report.parameter_problem.empty() ? "as on the server" : report.parameter_problem,
             &status);
