@@ -154,6 +154,22 @@ class ZonesTest(pt.NodeTest):
         self.clouds.paused = True
         node.wait_for_status(ProximityArray.NO_CLOUD, "zone 'target' has left points out of it")
 
+    def test_a_memory_keeps_what_is_in_a_zone(self):
+        """It is an obstacle when it is out of view, and none while it is seen."""
+        node = self.start_node(memory={"enabled": True})
+        self.assertIn("no effect on 'cloud/memory'", self.set().message)
+        for links in ([], [BALL]):
+            self.world.points = np.array([NEAR, FAR])
+            self.set(links=links)
+            message = self.wait_for_distance(BALL, 0.5, ["target"])
+            self.assertEqual(pt.link(message, BALL).source, "cloud")
+            self.world.points = np.array([FAR])
+            message = node.wait_for(
+                lambda m: pt.link(m, BALL).source == "cloud/memory", "what is remembered"
+            )
+            self.assertLess(pt.link(message, BALL).distance, 0.21)
+            self.assertGreater(pt.link(message, BALL).distance, 0.1)
+
     def test_parameters(self):
         zones = {
             "target": {
