@@ -64,7 +64,7 @@ void measure_synthetic(Measured* measured) {
   }
 }
 
-// Measures the cases without contact; contact_depth_test measures depths.
+// Measures the cases without contact; contact_of_links_test measures depths.
 void measure_cases(const std::vector<test::TruthCase>& cases, const CloudSnapshot& cloud,
                    const QueryConfig& config, ProximityQuery* query, test::Accuracy* row) {
   const std::vector<bool> known(test::kPandaLinks, true);

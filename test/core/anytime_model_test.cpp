@@ -19,6 +19,7 @@
 #include "support/demo_arm.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/robot_of_links.h"
 #include "support/sanitizers.h"
 #include "support/temp_dir.h"
 #include "support/trial.h"
@@ -37,15 +38,7 @@ RobotModelConfig config_to(double max_error) {
 }
 
 std::shared_ptr<const RobotDescription> robot_of(const std::vector<LinkGeometry>& links) {
-  auto robot = std::make_shared<RobotDescription>();
-  robot->name = "test";
-  for (const LinkGeometry& geometry : links) {
-    LinkDescription link;
-    link.name = "link" + std::to_string(robot->links.size());
-    link.geometry = geometry;
-    robot->links.push_back(std::move(link));
-  }
-  return robot;
+  return std::make_shared<const RobotDescription>(test::robot_of(links));
 }
 
 std::shared_ptr<const RobotDescription> demo() {
@@ -80,22 +73,6 @@ std::vector<AnytimeModel::Ptr> growth_points(const std::vector<AnytimeModel::Ptr
   return points;
 }
 
-double cover_distance(const Packing& packing, const Eigen::Vector3d& p) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const InnerSphere& sphere : packing.spheres) {
-    nearest = std::min(nearest, (p - sphere.center).norm() - sphere.cover_radius);
-  }
-  return nearest;
-}
-
-double inner_distance(const Packing& packing, const Eigen::Vector3d& p) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const InnerSphere& sphere : packing.spheres) {
-    nearest = std::min(nearest, (p - sphere.center).norm() - sphere.radius);
-  }
-  return nearest;
-}
-
 // The certificate, against the exact geometry at points about the link.
 void expect_certificate(const LinkModel& link, test::Rng* rng) {
   const PackingCertificate& certificate = link.packing.certificate;
@@ -103,10 +80,10 @@ void expect_certificate(const LinkModel& link, test::Rng* rng) {
   for (int i = 0; i < 100; ++i) {
     const Eigen::Vector3d p = test::random_vector(rng, size);
     const double exact = link.solid.signed_distance(p).distance;
-    const double cover = cover_distance(link.packing, p);
+    const double cover = link.tree.cover_distance(p);
     if (exact > 0.0) {
       ASSERT_LE(cover, exact + 1e-9) << link.name;
-      ASSERT_LE(inner_distance(link.packing, p), exact + certificate.max_gap + 1e-9) << link.name;
+      ASSERT_LE(link.tree.inner_distance(p), exact + certificate.max_gap + 1e-6) << link.name;
     } else {
       ASSERT_LE(cover, certificate.interior_gap + 1e-9) << link.name;
     }

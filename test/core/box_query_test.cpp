@@ -71,7 +71,7 @@ TEST(BoxDistance, TrianglesOfEveryKind) {
     }
     const BoxDistance found = triangle_to_box(a, b, c, box);
     const double truth =
-        test::oracle_box_distance(one_triangle(a, b, c), {box, Eigen::Isometry3d::Identity()});
+        test::BoxOracle(one_triangle(a, b, c)).distance({box, Eigen::Isometry3d::Identity()});
     ASSERT_NEAR(found.distance, truth, 1e-7 * (1.0 + size)) << i;
     ASSERT_NEAR((found.p_OS - found.p_OB).norm(), found.distance, 1e-12);
     ASSERT_LT(box.exteriorDistance(found.p_OB), 1e-12);

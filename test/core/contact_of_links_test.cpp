@@ -219,9 +219,9 @@ double deepest(const LinkTruth& link, const Eigen::Isometry3d& X_FL,
   Eigen::Vector3d witness = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& p_F : points_F) {
     const Eigen::Vector3d p_L = X_LF * p_F;
-    if (!link.bvh.bounds().contains(p_L) || !(link.bvh.winding_number(p_L) > 0.5)) continue;
+    if (!link.bvh.bounds().contains(p_L)) continue;
     const double distance = -std::sqrt(link.bvh.closest(p_L).distance_sq);
-    if (distance >= depth) continue;
+    if (distance >= depth || !(link.bvh.winding_number(p_L) > 0.5)) continue;
     depth = distance;
     witness = p_L;
   }

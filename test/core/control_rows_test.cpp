@@ -5,9 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -15,18 +13,15 @@
 #include "support/data_dir.h"
 #include "support/random_numbers.h"
 #include "support/sanitizers.h"
+#include "support/truth.h"
 
 namespace ist {
 namespace {
 
 using test::ControlRobot;
 
-test::ControlRobot panda(const std::string& package) {
-  std::ifstream file(package + "/robots/panda.urdf");
-  std::stringstream text;
-  text << file.rdbuf();
-  const RobotDescription description = parse_urdf(text.str(), GeometrySource::kCollision,
-                                                  [&](const std::string&) { return package; });
+test::ControlRobot panda(const std::filesystem::path& data) {
+  const RobotDescription description = test::read_panda(data, GeometrySource::kCollision);
   RobotModelConfig config;
   config.packing.max_error = 0.02;
   return {"panda", build_robot_model(description, config), description};
@@ -37,7 +32,7 @@ std::vector<ControlRobot> robots() {
   robots.push_back(test::demo_control_robot());
   robots.push_back(test::mesh_control_robot());
   const auto data = test::data_dir();
-  if (data && !test::kSanitized) robots.push_back(panda(test::franka_package(*data)));
+  if (data && !test::kSanitized) robots.push_back(panda(*data));
   return robots;
 }
 

@@ -125,16 +125,6 @@ std::vector<double> scene_depths(std::uint32_t width, std::uint32_t height, test
   return depths;
 }
 
-std::map<std::uint32_t, Eigen::Vector3d> points_by_id(const PointIndex& index) {
-  std::map<std::uint32_t, Eigen::Vector3d> points;
-  for (const PointTile& tile : test::tiles_of(index)) {
-    for (int k = 0; k < tile.count; ++k) {
-      EXPECT_TRUE(points.emplace(tile.id[k], index.X_FO() * tile.point(k)).second);
-    }
-  }
-  return points;
-}
-
 void expect_same_counts(const IngestCounts& a, const IngestCounts& b) {
   EXPECT_EQ(a.received, b.received);
   EXPECT_EQ(a.not_a_number, b.not_a_number);
@@ -171,8 +161,8 @@ TEST(DepthImage, PointsAreThoseOfTheCloud) {
         ingest.run(peer.raw, X_FS, {}, 0.0, &theirs);
         expect_same_counts(ours.counts, theirs.counts);
         EXPECT_GT(ours.counts.used, 0U);
-        const auto ours_by_id = points_by_id(ours.index);
-        for (const auto& [id, p] : points_by_id(theirs.index)) {
+        const auto ours_by_id = test::points_by_id(ours.index);
+        for (const auto& [id, p] : test::points_by_id(theirs.index)) {
           ASSERT_EQ(ours_by_id.count(id), 1U) << id;
           EXPECT_LT((ours_by_id.at(id) - p).norm(), 2e-7) << id;
         }
@@ -217,7 +207,7 @@ TEST(DepthImage, BaselineOfP) {
   const Message message(depths, width, camera, {"32FC1"});
   CloudSnapshot snapshot;
   Ingest(IngestConfig()).run(message.raw, Eigen::Isometry3d::Identity(), {}, 0.0, &snapshot);
-  const auto points = points_by_id(snapshot.index);
+  const auto points = test::points_by_id(snapshot.index);
   ASSERT_EQ(points.size(), depths.size());
   const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> P(camera.P.data());
   for (const auto& [id, p] : points) {
@@ -238,7 +228,7 @@ TEST(DepthImage, Unit) {
     CloudSnapshot snapshot;
     Ingest(test::whole_cloud(false))
         .run(message.raw, Eigen::Isometry3d::Identity(), {}, 0.0, &snapshot);
-    const double z = points_by_id(snapshot.index).at(0).z();
+    const double z = test::points_by_id(snapshot.index).at(0).z();
     EXPECT_NEAR(z, encoding == std::string("16UC1") ? 0.14 : 1.4, 1e-6);
   }
   Message message(std::vector<double>(32, 1.0), 8, camera, {"16UC1"});

@@ -65,19 +65,23 @@ struct FieldOfLink {
 };
 
 // Coarse and fine in turn.
-std::vector<FieldOfLink> fields_of_random_links(test::Rng* rng) {
-  std::vector<FieldOfLink> fields;
-  for (const LinkGeometry& link : test::random_links(rng)) {
-    const Solid solid(link);
-    for (const auto detail : kDetails)
-      fields.push_back({solid, link, DistanceField(solid, detail)});
-  }
-  return fields;
+const std::vector<FieldOfLink>& fields_of_random_links() {
+  static const std::vector<FieldOfLink> kFields = [] {
+    test::Rng rng(3);
+    std::vector<FieldOfLink> fields;
+    for (const LinkGeometry& link : test::random_links(&rng)) {
+      const Solid solid(link);
+      for (const auto detail : kDetails)
+        fields.push_back({solid, link, DistanceField(solid, detail)});
+    }
+    return fields;
+  }();
+  return kFields;
 }
 
 TEST(DistanceField, NodesAreLowerBoundsAndHardlyTooLow) {
   test::Rng rng(3);
-  for (const auto& [solid, link, field] : fields_of_random_links(&rng)) {
+  for (const auto& [solid, link, field] : fields_of_random_links()) {
     ASSERT_FALSE(field.empty());
     for (const DistanceField::Level& level : field.levels()) {
       const double slack = static_cast<double>(DistanceField::kStep) +
@@ -99,7 +103,7 @@ TEST(DistanceField, NodesAreLowerBoundsAndHardlyTooLow) {
 TEST(DistanceField, BallsHoldNothingThatIsInside) {
   test::Rng rng(4);
   int balls = 0, near_solids = 0;
-  for (const auto& [solid, link, field] : fields_of_random_links(&rng)) {
+  for (const auto& [solid, link, field] : fields_of_random_links()) {
     const DistanceField::Level& finest = field.levels().front();
     for (std::size_t k = 0; k < 2000; ++k) {
       const auto i = static_cast<std::size_t>(
@@ -123,7 +127,7 @@ TEST(DistanceField, BallsHoldNothingThatIsInside) {
 TEST(DistanceField, NoNodeInsideIsTakenForOutside) {
   test::Rng rng(5);
   int inside = 0;
-  for (const double size : {0.4, 0.8, 1.2, 2.0}) {
+  for (const double size : {0.4, 1.2, 2.0}) {
     for (const TriangleMesh& mesh :
          {test::box({size, 0.6 * size, 0.3 * size}), test::icosphere(0.5 * size, 3),
           test::torus(0.4 * size, 0.15 * size, 24, 12)}) {

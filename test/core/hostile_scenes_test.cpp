@@ -20,6 +20,7 @@
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/shape_oracle.h"
+#include "support/trial.h"
 #include "support/whole_cloud.h"
 
 namespace ist {
@@ -75,6 +76,22 @@ std::vector<Eigen::Vector3d> shell(test::Rng* rng, const LinkGeometry& link, int
   return points;
 }
 
+/// A wall, a ball beside the link, a shell about it, or a block; near the link or far from it.
+std::vector<Eigen::Vector3d> dense(test::Rng* rng, int count) {
+  const std::size_t kind = test::below(rng, 4);
+  const double far = test::power_of_ten(rng, -2.0, 0.3);
+  const Eigen::Isometry3d X = test::random_pose(rng, 0.1);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d u = test::random_vector(rng, 1.0);
+    const Eigen::Vector3d places[] = {X * Eigen::Vector3d(u.x(), u.y(), far + 0.002 * u.z()),
+                                      X * (0.05 * u.normalized() + far * Eigen::Vector3d::UnitX()),
+                                      X * (far * u.normalized()), u};
+    points.push_back(places[kind]);
+  }
+  return points;
+}
+
 /// Through the ingest, as an image or a list: points are read from the message when a query comes.
 void ingest(test::Rng* rng, Cloud* cloud) {
   const std::size_t size = cloud->points.size();
@@ -107,8 +124,9 @@ std::unique_ptr<Cloud> random_cloud(test::Rng* rng, const LinkGeometry& link,
                                     const Eigen::Isometry3d& X_FL) {
   auto cloud = std::make_unique<Cloud>();
   const int count = 1 + static_cast<int>(std::pow(test::uniform(rng, 0.0, 1.0), 3.0) * 150.0);
-  cloud->points =
-      test::chance(rng, 0.3) ? shell(rng, link, count) : test::random_points(rng, link, count);
+  cloud->points = test::chance(rng, 0.3)   ? shell(rng, link, count)
+                  : test::chance(rng, 0.2) ? dense(rng, count)
+                                           : test::random_points(rng, link, count);
   for (Eigen::Vector3d& p : cloud->points) p = X_FL * p;
   if (test::chance(rng, 0.3)) {
     ingest(rng, cloud.get());
@@ -191,6 +209,7 @@ class HostileScenes : public testing::Test {
     contacts_ += answer.state == LinkState::kContact ? 1 : 0;
     stopped_ += is_complete ? 0 : 1;
     EXPECT_EQ(test::broken_promise(answer, truth, query->config(), is_complete), "");
+    if (answer.state >= LinkState::kNear) test::expect_witness(answer, X_FL, truth.scale);
   }
 
   // In one of the three ways.

@@ -12,7 +12,6 @@
 #include <set>
 #include <vector>
 
-#include "internal/packing/packer.h"
 #include "ist_proximity/cloud/depth_image.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/robot/robot_model.h"
@@ -25,27 +24,6 @@ namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-struct Body {
-  LinkModel link;
-  explicit Body(const Shape& shape) {
-    PackingConfig config;
-    config.max_error = 0.01;
-    link.packing = pack_element(shape, config);
-    link.tree = InnerSphereTree(link.packing);
-    GeometryElement element;
-    element.shape = shape;
-    link.solid = Solid({element});
-  }
-};
-
-std::set<std::uint32_t> kept_of(const CloudSnapshot& snapshot) {
-  std::set<std::uint32_t> kept;
-  for (const PointTile& tile : test::tiles_of(snapshot.index)) {
-    kept.insert(tile.id, tile.id + tile.count);
-  }
-  return kept;
-}
 
 // What a filter keeps of an image, and another one has lost: single pixels or pairs near the robot
 // may be lost to noise.
@@ -74,8 +52,9 @@ struct Lost {
 TEST(HostileView, NothingIsLostThatThePaddingKeeps) {
   test::Rng rng(31);
   const auto uniform = [&](double low, double high) { return test::uniform(&rng, low, high); };
-  const std::vector<Body> bodies = {Body(Box{{0.2, 0.3, 0.1}}), Body(Cylinder{0.05, 0.4}),
-                                    Body(test::icosphere(0.1, 3)), Body(Sphere{0.08})};
+  const std::vector<LinkModel> bodies = {
+      test::make_link(Box{{0.2, 0.3, 0.1}}, 0.01), test::make_link(Cylinder{0.05, 0.4}, 0.01),
+      test::make_link(test::icosphere(0.1, 3), 0.01), test::make_link(Sphere{0.08}, 0.01)};
   int views = 0, kept_more = 0, on_robot = 0;
   std::size_t lost_pixels = 0;
   const int scenes = test::scaled(24);
@@ -111,13 +90,12 @@ TEST(HostileView, NothingIsLostThatThePaddingKeeps) {
         const double u = uniform(0, 1);
         const Eigen::Vector3d ray(rays->x[i % camera.width], rays->y[i / camera.width], 1.0);
         double z = uniform(0, 1) < 0.02 ? uniform(0.0, 2.5) : 2.0;
-        for (std::size_t b = 0; b < bodies.size();
-             ++b) {  // the nearest of many steps along the ray
-          for (double t = 0.02; t < z; t += 0.01) {
-            if (bodies[b].link.solid.signed_distance(X_SL[b].inverse() * (t * ray)).distance <
-                0.01) {
-              z = t;
-            }
+        for (std::size_t b = 0; b < bodies.size(); ++b) {  // steps along the ray up to a body
+          const Eigen::Isometry3d X_LS = X_SL[b].inverse();
+          for (double t = 0.02; t < z;) {
+            const double distance = bodies[b].solid.signed_distance(X_LS * (t * ray)).distance;
+            if (distance < 0.01) z = t;
+            t += std::max(0.01, (distance - 0.01) / ray.norm());
           }
         }
         z += 0.003 * uniform(-1, 1);
@@ -141,8 +119,8 @@ TEST(HostileView, NothingIsLostThatThePaddingKeeps) {
       std::vector<PosedSolid> robot;
       for (std::size_t b = 0; b < bodies.size(); ++b) {
         robot.emplace_back();
-        robot.back().tree = &bodies[b].link.tree;
-        robot.back().solid = &bodies[b].link.solid;
+        robot.back().tree = &bodies[b].tree;
+        robot.back().solid = &bodies[b].solid;
         robot.back().X_FL = X_FS * X_SL[b];
       }
       CloudSnapshot viewed, padded;
@@ -150,7 +128,8 @@ TEST(HostileView, NothingIsLostThatThePaddingKeeps) {
       if (frame == 0) stamp -= 5.0;  // the clock goes back, then stands still
       ASSERT_TRUE(viewed.X_FS.matrix().allFinite());
       by_padding.run(raw, viewed.X_FS, robot, stamp, &padded);
-      const std::set<std::uint32_t> kept = kept_of(viewed), least = kept_of(padded);
+      const std::set<std::uint32_t> kept = test::ids_of(viewed.index),
+                                    least = test::ids_of(padded.index);
       const Lost lost(least, kept);
       for (const std::uint32_t pixel : lost.pixels) {
         ASSERT_LE(lost.around(pixel, camera.width, 4), 2)

@@ -187,6 +187,7 @@ class ImageSequences : public ::testing::Test {
   double truth(std::size_t link) const {
     const Eigen::Isometry3d X_LF = X_FL_[link].inverse();
     double truth = kInfinity;
+    const test::BoxOracle oracle(meshes_[link]);
     for (const SourcePtr& source : used_) {
       const PointExtent& extent = source->cloud.extent;
       for (const Eigen::Vector3d& p_F : source->points) {
@@ -194,7 +195,7 @@ class ImageSequences : public ::testing::Test {
         truth = std::min(truth, test::oracle_signed_distance(meshes_[link], X_LF * p_F) - radius);
       }
       for (const Eigen::AlignedBox3d& box : source->boxes) {
-        truth = std::min(truth, test::oracle_box_distance(meshes_[link], {box, X_LF}));
+        truth = std::min(truth, oracle.distance({box, X_LF}));
       }
     }
     return truth;

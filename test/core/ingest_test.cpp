@@ -107,17 +107,6 @@ CloudSnapshot ingest(const Points& points, const IngestConfig& config = {},
   return snapshot;
 }
 
-// The points of an index in the fixed frame, by id.
-std::map<std::uint32_t, Eigen::Vector3d> points_by_id(const PointIndex& index) {
-  std::map<std::uint32_t, Eigen::Vector3d> points;
-  for (const PointTile& tile : test::tiles_of(index)) {
-    for (int k = 0; k < tile.count; ++k) {
-      EXPECT_TRUE(points.emplace(tile.id[k], index.X_FO() * tile.point(k)).second) << "id twice";
-    }
-  }
-  return points;
-}
-
 Points random_points(std::size_t n, double size, unsigned seed) {
   std::mt19937 random(seed);
   // The coordinates are floats, so that float32 and float64 messages hold the same points.
@@ -192,7 +181,7 @@ TEST(Ingest, rangesIncludeTheirBounds) {
                                          {1.2, 1.2, 1.2},
                                          {1.1, 1.1, 1.1}},
                                         config);
-  const auto points = points_by_id(snapshot.index);
+  const auto points = test::points_by_id(snapshot.index);
   ASSERT_EQ(points.size(), 3U);
   EXPECT_EQ(points.count(0), 1U);
   EXPECT_EQ(points.count(1), 1U);
@@ -241,20 +230,20 @@ TEST(Ingest, everyFormatReadsTheSame) {
   }
   const Eigen::Isometry3d X_FS = pose(0.3, -0.2, 0.9);
   const CloudSnapshot expected = ingest(points, {}, {}, X_FS);
-  const auto expected_points = points_by_id(expected.index);
+  const auto expected_points = test::points_by_id(expected.index);
   ASSERT_GT(expected_points.size(), 500U);
   for (const auto& [name, format] : formats) {
     SCOPED_TRACE(name);
     const CloudSnapshot snapshot = ingest(points, {}, format, X_FS);
     EXPECT_EQ(snapshot.counts.not_a_number, 1U);
     EXPECT_EQ(snapshot.counts.infinite, 1U);
-    EXPECT_TRUE(points_by_id(snapshot.index) == expected_points);
+    EXPECT_TRUE(test::points_by_id(snapshot.index) == expected_points);
   }
 }
 
 void expect_transformed(const Points& points, const Eigen::Isometry3d& X_FS,
                         const PointIndex& index, double tolerance) {
-  const auto found = points_by_id(index);
+  const auto found = test::points_by_id(index);
   ASSERT_EQ(found.size(), points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d expected = X_FS * points[i];
@@ -315,7 +304,7 @@ void check_images(const Format& format, unsigned blind) {
     EXPECT_EQ(a.counts.not_a_number, b.counts.not_a_number);
     EXPECT_EQ(a.counts.infinite, b.counts.infinite);
     EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
-    expect_same(points_by_id(a.index), points_by_id(b.index));
+    expect_same(test::points_by_id(a.index), test::points_by_id(b.index));
   }
 }
 
@@ -387,7 +376,7 @@ TEST(Ingest, imageAtItsRangeIsCutAsAListIs) {
       EXPECT_GT(a.counts.used, points.size() / 8);
       EXPECT_LT(a.counts.used, points.size() * 7 / 8);
       EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
-      expect_same(points_by_id(a.index), points_by_id(b.index));
+      expect_same(test::points_by_id(a.index), test::points_by_id(b.index));
     }
   }
 }
@@ -479,9 +468,9 @@ TEST(Ingest, pointsOutsideTheRegionOfInterestAreDiscarded) {
     ingest.run(message.raw, X_FS, {}, 0.0, &inside);
     EXPECT_EQ(all.region.radius, kInf);
     EXPECT_EQ(inside.region.radius, 1.5);
-    const auto found = points_by_id(inside.index);
+    const auto found = test::points_by_id(inside.index);
     std::size_t expected = 0;
-    for (const auto& [id, p] : points_by_id(all.index)) {
+    for (const auto& [id, p] : test::points_by_id(all.index)) {
       const double from_center = (p - region.center_F).norm();
       ASSERT_GT(std::abs(from_center - 1.5), 1e-9) << "rounding decides about this point";
       ASSERT_EQ(found.count(id), from_center < 1.5 ? 1U : 0U) << from_center;
@@ -537,7 +526,7 @@ void check_cells() {
   config.thinning = 0.1;
   const CloudSnapshot snapshot = ingest(random_points(20000, 1.0, 9), config, {}, pose(3, -4, 5));
   std::map<std::vector<std::int64_t>, std::pair<double, std::uint32_t>> nearest;
-  const auto all = points_by_id(snapshot.index);
+  const auto all = test::points_by_id(snapshot.index);
   for (const auto& [id, p] : all) {
     const auto cell = cell_of(p, config.thinning);
     const Eigen::Vector3d centre =

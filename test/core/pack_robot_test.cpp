@@ -141,7 +141,7 @@ TEST_F(PackRobotTest, exportedSpheresContainTheLinks) {
 TEST_F(PackRobotTest, anyNumberOfThreadsGivesTheSameSpheres) {
   for (const std::string order : {"medial", "disjoint", "volume"}) {
     std::vector<std::string> spheres;
-    for (const std::string threads : {"1", "2", "5"}) {
+    for (const std::string threads : {"1", "5"}) {
       ASSERT_EQ(run(kArm + " --no-cache --max-error 0.02 --order " + order + " --threads " +
                     threads + " --ply " + file("a.ply")),
                 0)
@@ -149,7 +149,6 @@ TEST_F(PackRobotTest, anyNumberOfThreadsGivesTheSameSpheres) {
       spheres.push_back(read(file("a.ply")));
     }
     EXPECT_EQ(spheres[0], spheres[1]) << order;
-    EXPECT_EQ(spheres[0], spheres[2]) << order;
   }
 }
 

@@ -32,7 +32,7 @@ TEST(PackingCheck, EveryOrderAndNumberOfSpheresPasses) {
       Box{{0.1, 0.2, 0.3}},           Cylinder{0.05, 0.4},      Sphere{0.1}};
   for (const Shape& shape : shapes) {
     for (const PackingOrder order : kOrders) {
-      for (const int max_spheres : {1, 2, 30, 20000}) {
+      for (const int max_spheres : {1, 30, 300}) {
         PackingConfig config;
         config.order = order;
         config.max_spheres = max_spheres;

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "support/demo_arm.h"
 #include "support/sanitizers.h"
 #include "support/temp_dir.h"
+#include "support/truth.h"
 
 namespace ist {
 namespace {
@@ -42,12 +42,7 @@ TEST(PandaPairs, AreThoseOfThePublishedSrdf) {
   const auto data = test::data_dir();
   if (!data) GTEST_SKIP() << test::kNoData;
   if (test::kSanitized) GTEST_SKIP() << "takes minutes";
-  const std::string package = test::franka_package(*data);
-  std::ifstream file(package + "/robots/panda.urdf");
-  std::stringstream text;
-  text << file.rdbuf();
-  const RobotDescription description = parse_urdf(text.str(), GeometrySource::kCollision,
-                                                  [&](const std::string&) { return package; });
+  const RobotDescription description = test::read_panda(*data, GeometrySource::kCollision);
   RobotModelConfig config;
   config.packing.max_error = 0.02;
   const auto model = build_robot_model(description, config);

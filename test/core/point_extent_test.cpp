@@ -274,9 +274,9 @@ TEST(BoxExtents, MapIsLargerOnAllSides) {
     for (std::size_t i = 0; i < meshes.size(); ++i) {
       if (results[i].state != LinkState::kNear) continue;
       double truth = truth_of(test::one(shapes[i]), X_FL, {clouds[1]}).spheres;
+      const test::BoxOracle oracle(meshes[i]);
       for (const Eigen::AlignedBox3d& box : boxes) {
-        truth = std::min(truth, test::oracle_box_distance(meshes[i], {box, X_FL.inverse()}) -
-                                    clouds[0].box_extent);
+        truth = std::min(truth, oracle.distance({box, X_FL.inverse()}) - clouds[0].box_extent);
       }
       ASSERT_LE(results[i].lower_bound, truth + 1e-9);
       EXPECT_GE(results[i].lower_bound, truth - config.tolerance - kRounding);

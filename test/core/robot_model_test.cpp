@@ -5,8 +5,6 @@
 #include <atomic>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -15,10 +13,8 @@
 
 #include "internal/robot/link_packing.h"
 #include "ist_proximity/geometry/error.h"
-#include "support/data_dir.h"
 #include "support/errors.h"
 #include "support/meshes.h"
-#include "support/sanitizers.h"
 #include "support/temp_dir.h"
 
 namespace ist {
@@ -237,29 +233,6 @@ TEST(LinkPacking, combinesCertificates) {
   EXPECT_NEAR(all.unreachable_area, 0.3, 1e-15);
   EXPECT_EQ(all.surface_area, 4.0);
   EXPECT_FALSE(all.reached);
-}
-
-TEST(RobotModelPanda, packsAllElevenLinks) {
-  const auto data = test::data_dir();
-  if (!data) GTEST_SKIP() << test::kNoData;
-  const std::string package = test::franka_package(*data);
-  std::ifstream file(package + "/robots/panda.urdf");
-  std::stringstream urdf;
-  urdf << file.rdbuf();
-  const RobotDescription description = parse_urdf(
-      urdf.str(), GeometrySource::kVisual,
-      [&](const std::string& name) { return name == "franka_description" ? package : ""; });
-  RobotModelConfig config;
-  config.packing.max_error = test::packed_to(config.packing.max_error);
-  const auto model = build_robot_model(description, config);
-  ASSERT_EQ(model->links.size(), 11U);
-  for (const LinkModel& l : model->links) {
-    EXPECT_TRUE(l.usable()) << l.error;
-    EXPECT_TRUE(l.packing.certificate.reached) << l.name;
-    EXPECT_LE(l.packing.certificate.max_gap, config.packing.max_error) << l.name;
-    EXPECT_GE(l.packing.spheres.size(), test::kSanitized ? 1U : 10U) << l.name;
-    EXPECT_LE(l.packing.spheres.size(), 20000U) << l.name;
-  }
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 #include <set>
 #include <string>
 
-#include "internal/packing/packer.h"
 #include "internal/robot/coarse_hulls.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/facade/obstacles.h"
@@ -23,28 +22,11 @@
 namespace ist {
 namespace {
 
-LinkModel link_of(const std::string& name, const Shape& shape, double max_error) {
-  PackingConfig config;
-  config.max_error = max_error;
-  LinkModel link;
-  link.name = name;
-  link.packing = pack_element(shape, config);
-  link.tree = InnerSphereTree(link.packing);
-  GeometryElement element;
-  element.shape = shape;
-  link.solid = Solid({element});
-  return link;
-}
-
 // The packing is coarse, so that the exact geometry has to decide for many points between inner and
 // cover spheres.
 RobotModel coarse_robot() {
-  RobotModel model;
-  model.links.push_back(link_of("box", Box{{0.3, 0.2, 0.1}}, 0.02));
-  model.links.push_back(link_of("cylinder", Cylinder{0.08, 0.4}, 0.02));
-  model.links.push_back(link_of("sphere", Sphere{0.12}, 0.02));
-  model.links.push_back(link_of("mesh", test::l_shape(0.3, 0.12), 0.02));
-  return model;
+  return *test::make_model(
+      {Box{{0.3, 0.2, 0.1}}, Cylinder{0.08, 0.4}, Sphere{0.12}, test::l_shape(0.3, 0.12)}, 0.02);
 }
 
 // A robot at its poses.
@@ -112,12 +94,6 @@ CloudSnapshot ingest(const std::vector<Eigen::Vector3f>& points, const PosedRobo
   return snapshot;
 }
 
-std::set<std::uint32_t> ids(const PointIndex& index) {
-  std::set<std::uint32_t> set;
-  for (const PointTile& tile : test::tiles_of(index)) set.insert(tile.id, tile.id + tile.count);
-  return set;
-}
-
 IngestConfig config_with(double padding) {
   IngestConfig config;
   config.min_range = 0.0;
@@ -131,7 +107,7 @@ std::size_t expect_same_as_exact(const std::vector<Eigen::Vector3f>& points,
                                  const PosedRobot& robot, double padding,
                                  const Eigen::Vector3d& base = Eigen::Vector3d::Zero()) {
   const CloudSnapshot snapshot = ingest(points, robot, config_with(padding), base);
-  const std::set<std::uint32_t> kept = ids(snapshot.index);
+  const std::set<std::uint32_t> kept = test::ids_of(snapshot.index);
   std::size_t dropped = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double distance = exact_distance(robot, base + points[i].cast<double>());
@@ -208,7 +184,7 @@ TEST(SelfFilter, linkWithoutGeometryDropsNothing) {
   const CloudSnapshot snapshot = ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
   robot.known[0] = robot.known[2] = false;
   const CloudSnapshot expected = ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
-  EXPECT_EQ(ids(snapshot.index), ids(expected.index));
+  EXPECT_EQ(test::ids_of(snapshot.index), test::ids_of(expected.index));
   EXPECT_GT(snapshot.counts.on_robot, 0U);
 }
 
@@ -240,7 +216,7 @@ TEST(SelfFilter, anImageIsDecidedByItsBoxes) {
     const IngestCounts& counts = snapshot.counts;
     EXPECT_EQ(counts.not_a_number, holes);
     EXPECT_EQ(counts.received, counts.not_a_number + counts.on_robot + counts.used);
-    const std::set<std::uint32_t> kept = ids(snapshot.index);
+    const std::set<std::uint32_t> kept = test::ids_of(snapshot.index);
     EXPECT_EQ(counts.used, kept.size());
     for (std::size_t i = 0; i < kWidth * kHeight; i += 3) {
       const Eigen::Vector3f p_S(&(*image)[4 * i]);
@@ -336,7 +312,7 @@ TEST(SelfFilter, NothingBetweenALinkAndACoarseHullIsDropped) {
     }
   }
   const auto expect_dropped = [&](const CloudSnapshot& snapshot, float padding) {
-    const std::set<std::uint32_t> kept = ids(snapshot.index);
+    const std::set<std::uint32_t> kept = test::ids_of(snapshot.index);
     for (std::uint32_t i = 0; i < points.size(); ++i) {
       EXPECT_EQ(kept.count(i) > 0, distances[i] > padding) << distances[i] << " m";
     }

@@ -1,4 +1,5 @@
-// Balls on one side of a link's surface, which tell the sides of other places.
+// The sides of a link's surface: that of a place, and balls on one side, which tell those of other
+// places.
 
 #include "proximity/coherence/side_balls.h"
 
@@ -9,7 +10,10 @@
 #include <vector>
 
 #include "internal/geometry/outside_margin.h"
+#include "ist_proximity/proximity/proximity_query.h"
 #include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 
@@ -80,6 +84,52 @@ TEST(SideBalls, AgreeWithTheWindingNumber) {
   }
   EXPECT_GT(outside, test::scaled(1000));
   EXPECT_GT(inside, test::scaled(1000));
+}
+
+// A point of the surface: of a face, an edge, or a corner.
+Eigen::Vector3d surface_point(const TriangleMesh& mesh, test::Rng* rng) {
+  const std::size_t t = (*rng)() % mesh.triangles.size(), kind = (*rng)() % 4;
+  const double a = kind == 0 ? 1.0 : test::uniform(rng, 0, 1);
+  const double b = kind == 0 ? 0.0 : kind == 1 ? 1.0 - a : test::uniform(rng, 0, 1.0 - a);
+  return a * mesh.corner(t, 0) + b * mesh.corner(t, 1) + (1.0 - a - b) * mesh.corner(t, 2);
+}
+
+// Float moves the corners of a mesh of 10 m by half a micrometre: up to 1 um from the surface its
+// winding number told the wrong side.
+TEST(Sides, AreThoseOfDoublePrecisionHoweverLargeTheMesh) {
+  test::Rng rng(173);
+  int inside = 0, outside = 0;
+  for (const double size : {1.0, 3.0, 10.0}) {
+    for (int m = 0; m < 12; ++m) {
+      TriangleMesh mesh = m % 3 == 0   ? test::box({1.0, 0.6, 0.8})
+                          : m % 3 == 1 ? test::random_lump(&rng)
+                                       : test::torus(0.4, 0.1, 16, 8);
+      const double scale = size / test::bounds(mesh).sizes().maxCoeff();
+      for (Eigen::Vector3d& v : mesh.vertices) v *= scale;
+      mesh = test::moved(mesh, test::random_pose(&rng, m % 2 == 0 ? 0.0 : 10.0));
+      const auto model = test::model_of({test::one(mesh)}, 0.2 * size);
+      const Solid& solid = model->links[0].solid;
+      ProximityQuery query(model, QueryConfig());
+      for (const double height : {1e-12, 1e-10, 1e-9, 1e-8, 5e-8, 2e-7, 1e-6}) {
+        for (int i = 0; i < test::scaled(40); ++i) {
+          const Eigen::Vector3d p =
+              surface_point(mesh, &rng) + height * test::random_vector(&rng, 1.0).normalized();
+          const double truth = test::oracle_signed_distance(mesh, p);
+          if (std::abs(truth) < 0.3 * height) continue;
+          ASSERT_EQ(solid.is_inside(p), truth < 0.0)
+              << height << " m from a mesh of " << size << " m, " << m;
+          (truth < 0.0 ? inside : outside) += 1;
+          // The same through a query: the stored point is asked about.
+          const CloudSnapshot cloud = test::make_snapshot({p}, p);
+          LinkProximity result;
+          ASSERT_TRUE(query.run_link(0, Eigen::Isometry3d::Identity(), {&cloud}, &result));
+          ASSERT_EQ(result.state == LinkState::kContact, truth < 0.0);
+        }
+      }
+    }
+  }
+  EXPECT_GT(inside, test::scaled(2500));
+  EXPECT_GT(outside, test::scaled(2500));
 }
 
 }  // namespace

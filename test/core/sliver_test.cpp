@@ -1,7 +1,7 @@
 // Closed meshes of slivers of every ratio, oblique, against extended precision. The search decides
 // in float which triangles may be nearest: what float cannot know of a sliver must not prune it.
 //
-// IST_PROXIMITY_SLIVER_CASES sets the number of cases of each test (default: 1,000,000).
+// IST_PROXIMITY_SLIVER_CASES sets the number of cases of each test (default: 300,000).
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ using Point = Eigen::Vector3d;
 
 int wanted_cases() {
   const char* wanted = std::getenv("IST_PROXIMITY_SLIVER_CASES");
-  return wanted != nullptr ? std::stoi(wanted) : test::scaled(1000000);
+  return wanted != nullptr ? std::stoi(wanted) : test::scaled(300000);
 }
 
 // Rounding of double: a dozen roundings of the largest length.

@@ -11,30 +11,16 @@
 
 #include "cloud/filters/self_filter.h"
 #include "internal/geometry/ray_cast.h"
-#include "internal/packing/packer.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "support/allocations.h"
 #include "support/meshes.h"
+#include "support/scene.h"
 
 namespace ist {
 namespace {
 
 constexpr std::size_t kPixels = TileView::kPixels;
 constexpr double kInf = std::numeric_limits<double>::infinity();
-
-struct Body {
-  InnerSphereTree tree;
-  Solid solid;
-
-  explicit Body(const Shape& shape) {
-    PackingConfig config;
-    config.max_error = 0.01;
-    tree = InnerSphereTree(pack_element(shape, config));
-    GeometryElement element;
-    element.shape = shape;
-    solid = Solid({element});
-  }
-};
 
 Eigen::Vector3d random_direction(std::mt19937_64* random) {
   std::normal_distribution<double> normal;
@@ -60,9 +46,10 @@ TileView::Sight nearest_surface(const std::vector<const SelfFilter::Link*>& link
 // the sights are those of all links, whichever link is looked at first, and however many rays at a
 // time.
 TEST(TileView, SightsAreThoseOfAllLinksInAnyOrder) {
-  const std::vector<Body> bodies = {Body(test::icosphere(0.1, 4)), Body(Box{{0.15, 0.1, 0.1}}),
-                                    Body(test::torus(0.12, 0.04, 48, 24)),
-                                    Body(Cylinder{0.05, 0.3})};
+  const auto model = test::make_model({test::icosphere(0.1, 4), Box{{0.15, 0.1, 0.1}},
+                                       test::torus(0.12, 0.04, 48, 24), Cylinder{0.05, 0.3}},
+                                      0.01);
+  const std::vector<LinkModel>& bodies = model->links;
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> u(-1.0, 1.0);
   TileView view;

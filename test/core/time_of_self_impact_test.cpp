@@ -48,20 +48,24 @@ std::vector<LinkPair> all_pairs(const test::Arm& arm) {
   return pairs;
 }
 
-// [m] The distance of two shapes, the second one posed; 0 or less in contact.
-double shape_distance(const LinkGeometry& a, const LinkGeometry& b, const Eigen::Isometry3d& X_AB) {
+using Groups = std::vector<test::TriangleGroups>;
+
+// [m] The distance of two links, the second one posed; 0 or less in contact.
+double link_distance(const test::Arm& arm, const Groups& groups, const LinkPair& pair,
+                     const Eigen::Isometry3d& X_AB) {
+  const LinkGeometry &a = arm.links[pair.first], &b = arm.links[pair.second];
   if (const auto* ball = std::get_if<Sphere>(&b[0].shape)) {
     return test::oracle_signed_distance(a, X_AB.translation()) - ball->radius;
   }
   if (const auto* ball = std::get_if<Sphere>(&a[0].shape)) {
     return test::oracle_signed_distance(b, X_AB.inverse().translation()) - ball->radius;
   }
-  const test::TriangleGroups of_a(test::triangles_of(a)), of_b(test::triangles_of(b));
+  const test::TriangleGroups &of_a = groups[pair.first], &of_b = groups[pair.second];
   const bool touch = of_a.holds_part_of(of_b, X_AB) || of_b.holds_part_of(of_a, X_AB.inverse());
   return touch ? 0.0 : of_a.distance(of_b, X_AB);
 }
 
-// No less than shape_distance() less the sizes of both: cheap, to spare samples.
+// No less than link_distance() less the sizes of both: cheap, to spare samples.
 double distance_at_least(const LinkGeometry& a, const LinkGeometry& b,
                          const Eigen::Isometry3d& X_AB) {
   const auto radius = [](const LinkGeometry& link) {
@@ -73,15 +77,15 @@ double distance_at_least(const LinkGeometry& a, const LinkGeometry& b,
 
 // [s] The first contact that samples find, at least every half millisecond where the links are
 // close, then bisection; +inf without any. No two points approach at more than 40 m/s.
-double sampled_impact(const test::Arm& arm, const test::ArmMotion& motion, const LinkPair& pair) {
+double sampled_impact(const test::Arm& arm, const Groups& groups, const test::ArmMotion& motion,
+                      const LinkPair& pair) {
   constexpr double kStep = 5e-4, kFastest = 40.0;
   const auto distance = [&](double time) {
     const auto X_FB = test::sampled_poses(arm, motion, time);
     const Eigen::Isometry3d X_AB =
         X_FB[arm.bodies[pair.first]].inverse() * X_FB[arm.bodies[pair.second]];
-    const LinkGeometry &a = arm.links[pair.first], &b = arm.links[pair.second];
-    const double far = distance_at_least(a, b, X_AB);
-    return far > 0.05 ? far : shape_distance(a, b, X_AB);
+    const double far = distance_at_least(arm.links[pair.first], arm.links[pair.second], X_AB);
+    return far > 0.05 ? far : link_distance(arm, groups, pair, X_AB);
   };
   double before = 0.0;
   for (double time = 0.0; time <= motion.joints.duration;) {
@@ -125,6 +129,8 @@ TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
     const test::Arm arm = arm_of_boxes_and_spheres(&rng);
     const std::vector<LinkPair> pairs = all_pairs(arm);
     if (pairs.empty()) continue;
+    Groups groups;
+    for (const LinkGeometry& link : arm.links) groups.emplace_back(test::triangles_of(link));
     QueryConfig config;
     config.max_distance = 0.5;
     TimeOfSelfImpact impacts(arm.model, arm.kinematics, pairs, config);
@@ -138,7 +144,7 @@ TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
       impacts.run(motion.joints, motion.still, std::vector<bool>(pairs.size(), true), &found);
       ++counts.motions;
       for (std::size_t k = 0; k < pairs.size(); ++k) {
-        const double truth = sampled_impact(arm, motion, pairs[k]);
+        const double truth = sampled_impact(arm, groups, motion, pairs[k]);
         if (truth == 0.0) {
           EXPECT_EQ(found[k].time, 0.0);
           continue;

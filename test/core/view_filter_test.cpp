@@ -11,7 +11,6 @@
 #include "cloud/filters/view_calibration.h"
 #include "internal/cloud/memory_scan.h"
 #include "internal/geometry/ray_cast.h"
-#include "internal/packing/packer.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "support/allocations.h"
@@ -38,15 +37,8 @@ struct Body {
   LinkModel link;
   Eigen::Isometry3d X_FL;
 
-  Body(const Shape& shape, const Eigen::Isometry3d& X) : X_FL(X) {
-    PackingConfig config;
-    config.max_error = 0.01;
-    link.packing = pack_element(shape, config);
-    link.tree = InnerSphereTree(link.packing);
-    GeometryElement element;
-    element.shape = shape;
-    link.solid = Solid({element});
-  }
+  Body(const Shape& shape, const Eigen::Isometry3d& X)
+      : link(test::make_link(shape, 0.01)), X_FL(X) {}
 };
 
 // An arm of a box, a tube and a ball, a metre in front of the camera, which looks along z.
@@ -120,14 +112,6 @@ IngestConfig config_of(SelfFilterMode mode) {
   return config;
 }
 
-std::set<std::uint32_t> kept_of(const CloudSnapshot& snapshot) {
-  std::set<std::uint32_t> kept;
-  for (const PointTile& tile : test::tiles_of(snapshot.index)) {
-    kept.insert(tile.id, tile.id + tile.count);
-  }
-  return kept;
-}
-
 // The pixels of a body, and how many of them are kept.
 struct Share {
   int pixels = 0, kept = 0;
@@ -191,12 +175,13 @@ TEST(ViewFilter, whatTouchesIsNoPartOfTheRobot) {
   Ingest by_padding(config_of(SelfFilterMode::kPadding)), by_view(config_of(SelfFilterMode::kView));
   const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   const CloudSnapshot padded = run(&by_padding, robot, others, X_FS, X_FS, 2, &image);
-  EXPECT_LT(share_of(image, kept_of(padded), 3, 3).kept, share_of(image, {}, 3, 3).pixels / 10);
+  EXPECT_LT(share_of(image, test::ids_of(padded.index), 3, 3).kept,
+            share_of(image, {}, 3, 3).pixels / 10);
   EXPECT_FALSE(padded.view.is_used);
 
   const CloudSnapshot viewed = run(&by_view, robot, others, X_FS, X_FS, 2, &image);
   ASSERT_TRUE(viewed.view.is_used);
-  const std::set<std::uint32_t> kept = kept_of(viewed);
+  const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
   const Share plate = share_of(image, kept, 3, 3), ball = share_of(image, kept, 4, 4);
   EXPECT_GT(plate.pixels, 100);
   EXPECT_GT(plate.kept, 0.9 * plate.pixels);
@@ -237,7 +222,7 @@ TEST(ViewFilter, continuesAnObstacleTowardItsContact) {
   for (int i = 0; i < 10; ++i) {
     image = picture(pointers(robot, {ramp}), X_FS, kNoise, i);
     at_ramp.run(image.raw(), X_FS, posed(robot), 0.1 * i, &viewed);
-    const std::set<std::uint32_t> kept = kept_of(viewed);
+    const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
     for (std::size_t k = 0; k < image.seen.size(); ++k) {
       const Eigen::Vector3d p_F(image.xyz[3 * k], image.xyz[3 * k + 1], image.xyz[3 * k + 2]);
       if (image.seen[k] != 3 || (face.inverse() * p_F).z() < -0.012) continue;
@@ -248,7 +233,7 @@ TEST(ViewFilter, continuesAnObstacleTowardItsContact) {
   EXPECT_GT(foot.kept, 0.82 * foot.pixels) << "three rings of pixels: 0.85; one: 0.77";
 
   viewed = run(&at_plate, robot, {plate}, X_FS, X_FS, 3, &image);
-  EXPECT_GT(share_of(image, kept_of(viewed), 3, 3).kept, 100);
+  EXPECT_GT(share_of(image, test::ids_of(viewed.index), 3, 3).kept, 100);
   for (const PointTile& tile : test::tiles_of(viewed.index)) {
     for (int k = 0; k < tile.count; ++k) {
       const Eigen::Vector3d p_F = viewed.index.X_FO() * tile.point(k);
@@ -276,8 +261,8 @@ TEST(ViewFilter, anObstacleEndsAtAnOutlineInTheImage) {
   for (int i = 0; i < 10; ++i) {
     const Image image = picture(pointers(robot, {plate, board}), X_FS, kNoise, i);
     ingest.run(image.raw(), X_FS, posed(robot), 0.1 * i, &viewed);
-    const Share link = share_of(image, kept_of(viewed), 0, 0),
-                plates = share_of(image, kept_of(viewed), 3, 4);
+    const Share link = share_of(image, test::ids_of(viewed.index), 0, 0),
+                plates = share_of(image, test::ids_of(viewed.index), 3, 4);
     front.pixels += link.pixels;
     front.kept += link.kept;
     others.pixels += plates.pixels;
@@ -323,7 +308,7 @@ TEST(ViewFilter, singlePixelsOfNoiseAreTheRobots) {
     for (const std::size_t pixel : c.others) put(pixel, c.height_of_others);
     CloudSnapshot viewed;
     ingest.run(image.raw(), X_FS, posed(robot), 0.5, &viewed);
-    const std::set<std::uint32_t> kept = kept_of(viewed);
+    const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
     for (const std::size_t pixel : c.pixels) {
       EXPECT_EQ(kept.count(static_cast<std::uint32_t>(pixel)) != 0, c.is_obstacle)
           << c.pixels.size() << " pixels at " << c.height << " m, " << c.others.size()
@@ -347,9 +332,9 @@ TEST(ViewFilter, dropsNothingThatThePaddingKeeps) {
     by_view.run(image.raw(), X_FS, posed(robot), 0.0, &viewed);
     Ingest by_padding(config_of(SelfFilterMode::kPadding));
     by_padding.run(image.raw(), X_FS * viewed.view.X_SC, posed(robot), 0.0, &padded);
-    const std::set<std::uint32_t> kept = kept_of(viewed);
+    const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
     int lost = 0;
-    for (const std::uint32_t id : kept_of(padded)) lost += kept.count(id) == 0 ? 1 : 0;
+    for (const std::uint32_t id : test::ids_of(padded.index)) lost += kept.count(id) == 0 ? 1 : 0;
     EXPECT_LE(lost, 3) << "the correction reported is newer than the one used, by micrometres";
     EXPECT_EQ(viewed.counts.received, viewed.counts.used + viewed.counts.on_robot +
                                           viewed.counts.out_of_range + viewed.counts.not_a_number);
@@ -376,7 +361,7 @@ TEST(ViewFilter, correctsTheSensorsPose) {
   }
   EXPECT_GT(viewed.view.offset, 0.005);
   EXPECT_LT(viewed.view.uncertainty, 0.001);
-  EXPECT_EQ(share_of(image, kept_of(viewed), 0, 2).kept, 0);
+  EXPECT_EQ(share_of(image, test::ids_of(viewed.index), 0, 2).kept, 0);
   EXPECT_GT(viewed.view.angle, 0.5 * 0.0175);
 }
 
@@ -412,7 +397,7 @@ TEST(ViewFilter, findsAPoseThatTakesTheRobotOutOfItsSkin) {
       const Eigen::Vector3d p = body.X_FL.translation();
       EXPECT_LT((left * p - p).norm(), 0.005) << i;
     }
-    EXPECT_LT(share_of(image, kept_of(viewed), 0, 2).kept, 3) << i;
+    EXPECT_LT(share_of(image, test::ids_of(viewed.index), 0, 2).kept, 3) << i;
   }
 }
 
@@ -431,7 +416,7 @@ TEST(ViewFilter, takesNoBoardForTheRobotInTheFirstPicture) {
           Image image;
           const CloudSnapshot viewed = run(&ingest, robot, board, Eigen::Isometry3d::Identity(),
                                            camera_error(0.2 * angle, angle), 1, &image);
-          const Share kept = share_of(image, kept_of(viewed), 3, 3);
+          const Share kept = share_of(image, test::ids_of(viewed.index), 3, 3);
           EXPECT_GT(kept.pixels, 1000);
           EXPECT_GT(kept.kept, (is_thin ? 0.95 : 0.99) * kept.pixels)
               << angle << ", " << distance << ", " << x;
@@ -540,7 +525,7 @@ TEST(ViewFilter, mixedPixelsAndShadowsAreTheRobots) {
   EXPECT_GT(mixed, 100U);
   ingest.run(image.raw(), X_FS, posed(robot), 0.0, &viewed);
   ingest.run(image.raw(), X_FS, posed(robot), 0.1, &viewed);
-  const std::set<std::uint32_t> kept = kept_of(viewed);
+  const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
   EXPECT_LE(share_of(image, kept, 9, 9).kept, static_cast<int>(mixed / 50));
   EXPECT_EQ(share_of(image, kept, 0, 2).kept, 0);
 }
@@ -568,7 +553,7 @@ TEST(ViewFilter, whatCameInStaysAnObstacle) {
                                     X_FS, kNoise, seed);
         ingest.run(image.raw(), X_FS, posed(robot), stamp += 0.033, &viewed);
         if (!is_last) continue;
-        const Share share = share_of(image, kept_of(viewed), 3, 3);
+        const Share share = share_of(image, test::ids_of(viewed.index), 3, 3);
         (comes ? tracked : alone) += share.kept;
         pixels += share.pixels;
       }
@@ -592,7 +577,7 @@ TEST(ViewFilter, otherCloudsAreFilteredByPadding) {
   by_view.run(list, X_FS, posed(robot), 0.0, &viewed);
   by_padding.run(list, X_FS, posed(robot), 0.0, &padded);
   EXPECT_FALSE(viewed.view.is_used);
-  EXPECT_EQ(kept_of(viewed), kept_of(padded));
+  EXPECT_EQ(test::ids_of(viewed.index), test::ids_of(padded.index));
 
   std::mt19937 random(1);
   std::vector<float> shuffled = image.xyz;

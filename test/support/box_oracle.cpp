@@ -1,92 +1,24 @@
 #include "support/box_oracle.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <memory>
 
-#include "support/oracle.h"
+#include "support/random_links.h"
 
 namespace ist::test {
-namespace {
 
-// Distance between the segments ab and cd.
-double oracle_segments(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-                       const Eigen::Vector3d& d) {
-  double nearest = std::min({oracle_segment(a, c, d), oracle_segment(b, c, d),
-                             oracle_segment(c, a, b), oracle_segment(d, a, b)});
-  // The common normal meets both segments between their ends.
-  Eigen::Matrix<double, 3, 2> along;
-  along << b - a, c - d;
-  const Eigen::Matrix2d gram = along.transpose() * along;
-  if (std::abs(gram.determinant()) < 1e-14 * gram(0, 0) * gram(1, 1)) return nearest;
-  const Eigen::Vector2d s = gram.inverse() * (along.transpose() * (c - a));
-  if (s.minCoeff() >= 0.0 && s.maxCoeff() <= 1.0) {
-    nearest = std::min(nearest, (a + s[0] * (b - a) - c - s[1] * (d - c)).norm());
-  }
-  return nearest;
-}
+BoxOracle::BoxOracle(const TriangleMesh& mesh)
+    : triangles_(triangles_of(one(mesh))), surface_(triangles_) {}
 
-// Whether segment pq passes through triangle abc.
-bool oracle_pierces(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& a,
-                    const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-  const auto volume = [](const Eigen::Vector3d& u, const Eigen::Vector3d& v,
-                         const Eigen::Vector3d& w,
-                         const Eigen::Vector3d& x) { return (v - u).cross(w - u).dot(x - u); };
-  if (volume(a, b, c, p) * volume(a, b, c, q) > 0.0) return false;
-  const double s = volume(p, q, a, b), t = volume(p, q, b, c), u = volume(p, q, c, a);
-  return (s >= 0.0 && t >= 0.0 && u >= 0.0) || (s <= 0.0 && t <= 0.0 && u <= 0.0);
-}
-
-}  // namespace
-
-Eigen::Vector3d PlacedBox::corner(int k) const {
-  const Eigen::Vector3d p((k & 1) != 0 ? box.max().x() : box.min().x(),
-                          (k & 2) != 0 ? box.max().y() : box.min().y(),
-                          (k & 4) != 0 ? box.max().z() : box.min().z());
-  return X * p;
-}
-
-bool PlacedBox::contains(const Eigen::Vector3d& p) const { return box.contains(X.inverse() * p); }
-
-double oracle_box_distance(const TriangleMesh& mesh, const PlacedBox& placed) {
-  constexpr int kFace[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
-                               {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
-  std::vector<std::array<Eigen::Vector3d, 3>> sides;
-  for (const auto& f : kFace) {
-    const Eigen::Vector3d p[4] = {placed.corner(f[0]), placed.corner(f[1]), placed.corner(f[2]),
-                                  placed.corner(f[3])};
-    sides.push_back({p[0], p[1], p[2]});
-    sides.push_back({p[0], p[2], p[3]});
-  }
-  double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const std::array<Eigen::Vector3d, 3> tri = {mesh.corner(t, 0), mesh.corner(t, 1),
-                                                mesh.corner(t, 2)};
-    if (placed.contains(tri[0])) return 0.0;
-    const double longest_edge = std::max((tri[1] - tri[0]).norm(), (tri[2] - tri[0]).norm());
-    const Eigen::Vector3d middle = placed.X * placed.box.center();
-    if ((tri[0] - middle).norm() - longest_edge - 0.5 * placed.box.sizes().norm() > nearest)
-      continue;
-    for (const auto& side : sides) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        nearest = std::min(nearest, oracle_triangle(tri[i], side[0], side[1], side[2]));
-        nearest = std::min(nearest, oracle_triangle(side[i], tri[0], tri[1], tri[2]));
-        const std::size_t next = (i + 1) % 3;
-        if (oracle_pierces(tri[i], tri[next], side[0], side[1], side[2]) ||
-            oracle_pierces(side[i], side[next], tri[0], tri[1], tri[2])) {
-          return 0.0;
-        }
-        for (std::size_t j = 0; j < 3; ++j) {
-          nearest =
-              std::min(nearest, oracle_segments(tri[i], tri[next], side[j], side[(j + 1) % 3]));
-        }
-      }
-    }
-  }
-  return nearest;
+double BoxOracle::distance(const PlacedBox& placed) const {
+  const Eigen::Isometry3d X_inv = placed.X.inverse();
+  const auto is_inside = [&](const auto& t) { return placed.box.contains(X_inv * t.p[0]); };
+  if (std::any_of(triangles_.begin(), triangles_.end(), is_inside)) return 0.0;
+  const Eigen::Isometry3d X = placed.X * Eigen::Translation3d(placed.box.center());
+  return surface_.distance(TriangleGroups(triangles_of({{Box{placed.box.sizes()}, X, "box"}})),
+                           Eigen::Isometry3d::Identity());
 }
 
 CloudSnapshot make_map(const std::vector<Eigen::AlignedBox3d>& boxes_M,

@@ -15,18 +15,19 @@ namespace ist::test {
 BoxTruth truth_of(const TriangleMesh& mesh, const CloudSnapshot& map,
                   const Eigen::Isometry3d& X_FL) {
   BoxTruth truth;
+  const BoxOracle oracle(mesh);
+  const Eigen::AlignedBox3d around = bounds(mesh);
   const Eigen::Isometry3d X_LM = X_FL.inverse() * map.X_FM;
   for (const BoxTile& tile : map.boxes->bvh().tiles()) {
     for (int k = 0; k < tile.count; ++k) {
       const PlacedBox placed{tile.box(k), X_LM * Eigen::Translation3d(map.boxes->origin())};
       const Eigen::Vector3d center = placed.X * placed.box.center();
-      const Eigen::AlignedBox3d around = bounds(mesh);
       const double radii = 0.5 * (placed.box.sizes().norm() + around.sizes().norm());
       if ((center - around.center()).norm() - radii > truth.distance) continue;
-      const double distance = oracle_box_distance(mesh, placed);
+      const double distance = oracle.distance(placed);
       truth.distance = std::min(truth.distance, distance);
-      const bool inside = oracle_winding(mesh, center) > 0.5;
-      truth.is_contact = truth.is_contact || distance == 0.0 || inside;
+      truth.is_contact = truth.is_contact || distance == 0.0 ||
+                         (around.contains(center) && oracle_winding(mesh, center) > 0.5);
     }
   }
   return truth;

@@ -3,6 +3,8 @@
 #include <utility>
 #include <variant>
 
+#include "support/oracle.h"
+
 namespace ist::test {
 namespace {
 
@@ -106,13 +108,8 @@ bool TriangleGroups::holds_part_of(const TriangleGroups& other, const Eigen::Iso
 
 bool TriangleGroups::contains(const Eigen::Vector3d& p) const {
   if (!box_.contains(p)) return false;
-  double angle = 0.0;  // the sum of solid angles (van Oosterom and Strackee 1983)
-  for (const auto& t : triangles_) {
-    const Eigen::Vector3d a = t.p[0] - p, b = t.p[1] - p, c = t.p[2] - p;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    angle += 2.0 * std::atan2(a.dot(b.cross(c)),
-                              la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
+  double angle = 0.0;
+  for (const auto& t : triangles_) angle += oracle_solid_angle(t.p[0] - p, t.p[1] - p, t.p[2] - p);
   return angle > 0.5 * 4.0 * 3.14159265358979323846;
 }
 

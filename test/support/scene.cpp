@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 
 #include "internal/packing/packer.h"
 #include "support/sanitizers.h"
@@ -26,17 +25,21 @@ Eigen::Isometry3d random_pose(Rng* rng, double size) {
   return X;
 }
 
+LinkModel make_link(const Shape& shape, double max_error) {
+  LinkModel link;
+  PackingConfig config;
+  config.max_error = packed_to(max_error);
+  link.packing = pack_element(shape, config);
+  link.tree = InnerSphereTree(link.packing);
+  link.solid = Solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}});
+  return link;
+}
+
 std::shared_ptr<RobotModel> make_model(const std::vector<Shape>& shapes, double max_error) {
   auto model = std::make_shared<RobotModel>();
   for (const Shape& shape : shapes) {
-    LinkModel link;
-    link.name = "link" + std::to_string(model->links.size());
-    PackingConfig config;
-    config.max_error = packed_to(max_error);
-    link.packing = pack_element(shape, config);
-    link.tree = InnerSphereTree(link.packing);
-    link.solid = Solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}});
-    model->links.push_back(std::move(link));
+    model->links.push_back(make_link(shape, max_error));
+    model->links.back().name = "link" + std::to_string(model->links.size() - 1);
   }
   return model;
 }

@@ -20,6 +20,9 @@ Eigen::Vector3d random_vector(Rng* rng, double size);
 
 Eigen::Isometry3d random_pose(Rng* rng, double size);
 
+/// A link of one element.
+LinkModel make_link(const Shape& shape, double max_error);
+
 /// A robot of one-element links.
 std::shared_ptr<RobotModel> make_model(const std::vector<Shape>& shapes, double max_error);
 

@@ -37,10 +37,21 @@ double oracle_signed_distance(const LinkGeometry& link, const Eigen::Vector3d& p
 
 double oracle_minimum(const LinkGeometry& link, const Eigen::Isometry3d& X_FL,
                       const std::vector<Eigen::Vector3d>& points_F) {
-  const Eigen::Isometry3d X_LF = X_FL.inverse();
   double smallest = std::numeric_limits<double>::infinity();
-  for (const Eigen::Vector3d& p_F : points_F) {
-    smallest = std::min(smallest, oracle_signed_distance(link, X_LF * p_F));
+  for (const GeometryElement& element : link) {
+    const Eigen::Isometry3d X_EF = (X_FL * element.X_LE).inverse();
+    std::vector<Eigen::Vector3d> points_E;
+    points_E.reserve(points_F.size());
+    for (const Eigen::Vector3d& p_F : points_F) points_E.push_back(X_EF * p_F);
+    if (const auto* mesh = std::get_if<TriangleMesh>(&element.shape)) {
+      smallest = std::min(smallest, oracle_minimum(*mesh, points_E));
+      continue;
+    }
+    for (const Eigen::Vector3d& p_E : points_E) {
+      smallest = std::min(
+          smallest,
+          std::visit([&](const auto& s) { return oracle_signed_distance(s, p_E); }, element.shape));
+    }
   }
   return smallest;
 }

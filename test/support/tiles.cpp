@@ -1,6 +1,8 @@
 #include "support/tiles.h"
 
 #include <algorithm>
+#include <stdexcept>
+#include <string>
 
 namespace ist::test {
 
@@ -12,6 +14,24 @@ std::vector<PointTile> tiles_of(const PointBvh& bvh) {
 }
 
 std::vector<PointTile> tiles_of(const PointIndex& index) { return tiles_of(index.bvh()); }
+
+std::map<std::uint32_t, Eigen::Vector3d> points_by_id(const PointIndex& index) {
+  std::map<std::uint32_t, Eigen::Vector3d> points;
+  for (const PointTile& tile : tiles_of(index)) {
+    for (int k = 0; k < tile.count; ++k) {
+      if (!points.emplace(tile.id[k], index.X_FO() * tile.point(k)).second) {
+        throw std::logic_error("point " + std::to_string(tile.id[k]) + " is there twice");
+      }
+    }
+  }
+  return points;
+}
+
+std::set<std::uint32_t> ids_of(const PointIndex& index) {
+  std::set<std::uint32_t> ids;
+  for (const auto& [id, p_F] : points_by_id(index)) ids.insert(ids.end(), id);
+  return ids;
+}
 
 std::vector<ThinnedTile> thinned_tiles_of(const PointIndex& index) {
   const ThinnedCloud cloud = index.bvh().thinned();

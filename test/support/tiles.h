@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "internal/cloud/point_bvh.h"
@@ -12,6 +13,11 @@ namespace ist::test {
 /// All tiles of an index, whether a query has looked at them or not.
 std::vector<PointTile> tiles_of(const PointBvh& bvh);
 std::vector<PointTile> tiles_of(const PointIndex& index);
+
+/// The points of an index in the fixed frame [m], by their ids, and the ids.
+/// @throws std::logic_error where an id is there twice
+std::map<std::uint32_t, Eigen::Vector3d> points_by_id(const PointIndex& index);
+std::set<std::uint32_t> ids_of(const PointIndex& index);
 
 /// All tiles of a thinned cloud, whether a query has looked at them or not.
 std::vector<ThinnedTile> thinned_tiles_of(const PointIndex& index);

@@ -3,10 +3,12 @@
 #include <Eigen/Core>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "internal/geometry/mesh_io.h"
+#include "support/data_dir.h"
 #include "support/npy.h"
 #include "support/pcd.h"
 #include "support/sanitizers.h"
@@ -18,6 +20,14 @@ const char* panda_mesh(std::size_t link) {
                                                "link4", "link5",  "link6", "link7",
                                                "hand",  "finger", "finger"};
   return kNames[link];
+}
+
+RobotDescription read_panda(const std::filesystem::path& data, GeometrySource source) {
+  const std::string package = franka_package(data);
+  std::ifstream file(package + "/robots/panda.urdf");
+  std::stringstream text;
+  text << file.rdbuf();
+  return parse_urdf(text.str(), source, [&](const std::string&) { return package; });
 }
 
 RobotDescription panda_description(const std::filesystem::path& data) {

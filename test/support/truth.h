@@ -29,6 +29,8 @@ struct TruthCase {
 
 const char* panda_mesh(std::size_t link);
 
+/// As its URDF describes it.
+RobotDescription read_panda(const std::filesystem::path& data, GeometrySource source);
 /// The visual meshes as links, in the frames of the poses.
 RobotDescription panda_description(const std::filesystem::path& data);
 
