@@ -1,7 +1,20 @@
 """What the tests share."""
 
+import os
+import pathlib
+
 import numpy as np
 import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+os.environ['ROS_PACKAGE_PATH'] = str(ROOT)
+
+
+@pytest.fixture(scope='session', name='robot')
+def fixture_robot():
+    """The demo's arm, packed once."""
+    import ist_proximity as ist  # pylint: disable=import-outside-toplevel
+    return ist.Robot(str(ROOT / 'demo' / 'demo_arm.urdf'))
 
 
 @pytest.fixture(scope='session', name='wall_points')

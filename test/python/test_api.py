@@ -1,7 +1,6 @@
 """The Python module: shapes, answers, errors, pickling, threads."""
 
 import copy
-import os
 import pathlib
 import pickle
 import threading
@@ -11,17 +10,9 @@ import types
 import numpy as np
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-os.environ['ROS_PACKAGE_PATH'] = str(ROOT)
+import ist_proximity as ist
 
-import ist_proximity as ist  # noqa: E402  (the environment comes first)
-
-URDF = ROOT / 'demo' / 'demo_arm.urdf'
-
-
-@pytest.fixture(scope='module', name='robot')
-def fixture_robot():
-    return ist.Robot(str(URDF))
+URDF = pathlib.Path(__file__).resolve().parents[2] / 'demo' / 'demo_arm.urdf'
 
 
 def random_scene(robot, seed, points=500, configurations=20):
@@ -96,37 +87,19 @@ def test_unknown_positions(robot):
     assert (named.distance == robot.distances(q, obstacles).distance).all()
 
 
-def test_a_stated_mimic_joint_counts():
-    ball = '<collision><geometry><sphere radius="0.05"/></geometry></collision>'
-    slide = ('<joint name="{0}" type="prismatic"><parent link="hand"/><child link="{0}_link"/>'
-             '<axis xyz="{1}"/><limit lower="-1" upper="1" velocity="1" effort="1"/>{2}</joint>')
-    hand = ist.Robot('<robot name="hand"><link name="hand"/>'
-                     f'<link name="left_link">{ball}</link><link name="right_link">{ball}</link>'
-                     + slide.format('left', '0 1 0', '')
-                     + slide.format('right', '1 0 0', '<mimic joint="left"/>') + '</robot>')
-    obstacles = ist.Obstacles(np.array([[0.5, 0.0, 0.0]]))
-    right = hand.links.index('right_link')
-    for q, x in (({'left': 0.1}, 0.1), ({'left': 0.1, 'right': 0.3}, 0.3), ({'right': 0.2}, 0.2)):
-        assert abs(hand.distances(q, obstacles, tolerance=0.0).distance[right] - (0.45 - x)) < 1e-6
-        assert abs(hand.nearest(q, obstacles, tolerance=0.0).distance - (0.45 - x)) < 1e-6
-        assert abs(hand.link_poses(q)[right, 0, 3] - x) < 1e-12
-    unknown = hand.distances({'left': 0.1, 'right': np.nan}, obstacles)
-    assert unknown.state[right] == ist.UNKNOWN
-
-
 BOX_STL = """solid wall
 facet normal 0 0 0
 outer loop
-vertex 0 -1 -1
-vertex 0 1 -1
-vertex 0 1 1
+vertex 0 -0.1 -0.1
+vertex 0 0.1 -0.1
+vertex 0 0.1 0.1
 endloop
 endfacet
 facet normal 0 0 0
 outer loop
-vertex 0 -1 -1
-vertex 0 1 1
-vertex 0 -1 1
+vertex 0 -0.1 -0.1
+vertex 0 0.1 0.1
+vertex 0 -0.1 0.1
 endloop
 endfacet
 endsolid wall
@@ -458,21 +431,3 @@ def test_cycle_cost_of_a_file(robot, wall_pcd):
     cost = robot.cycle_cost(q, obstacles)
     expected = robot.distances(q[0], obstacles).lower_bound.min()
     assert np.abs(cost['smallest'] - expected).max() <= 0.002
-
-
-def test_direction_is_the_gradient_of_the_distance(robot):
-    """direction^T J, as doc/messages.md builds a constraint from it, is how the distance changes."""
-    cloud, configurations = random_scene(robot, 12, points=60)
-    obstacles, step, checked = ist.Obstacles(cloud), 1e-5, 0
-    for q in configurations[:8]:
-        answer, X = robot.distances(q, obstacles, tolerance=0.0), robot.link_poses(q)
-        moved = q + step * np.eye(len(q))
-        X_moved, after = robot.link_poses(moved), robot.distances(moved, obstacles, tolerance=0.0)
-        for i in np.flatnonzero(answer.state == ist.NEAR):
-            p = np.append(answer.point_on_link_local[i], 1.0)
-            J = ((X_moved[:, i] @ p - X[i] @ p) / step)[:, :3].T
-            same = after.point[:, i] == answer.point[i]
-            change = (after.distance[:, i] - answer.distance[i]) / step
-            assert np.abs(answer.direction[i] @ J - change)[same].max(initial=0.0) < 0.02
-            checked += same.sum()
-    assert checked > 100

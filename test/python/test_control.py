@@ -1,20 +1,9 @@
 """Rows and the velocity filter in Python."""
 
-import os
-import pathlib
-
 import numpy as np
 import pytest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-os.environ['ROS_PACKAGE_PATH'] = str(ROOT)
-
-import ist_proximity as ist  # noqa: E402  (the environment comes first)
-
-
-@pytest.fixture(scope='module', name='robot')
-def fixture_robot():
-    return ist.Robot(str(ROOT / 'demo' / 'demo_arm.urdf'))
+import ist_proximity as ist
 
 
 @pytest.fixture(scope='module', name='obstacles')

@@ -1,6 +1,5 @@
 """The examples in Python run, and say what the library says."""
 
-import os
 import pathlib
 import subprocess
 import sys
@@ -8,11 +7,9 @@ import sys
 import numpy as np
 import pytest
 
+import ist_proximity as ist
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-os.environ['ROS_PACKAGE_PATH'] = str(ROOT)
-
-import ist_proximity as ist  # noqa: E402  (the environment comes first)
-
 URDF = ROOT / 'demo' / 'demo_arm.urdf'
 
 
@@ -23,7 +20,7 @@ def run(name, *arguments):
 
 def test_distances(wall_pcd):
     text = run('distances.py', wall_pcd)
-    robot = ist.Robot(str(URDF))
+    robot = ist.Robot(str(URDF))  # as fresh as the program's: a query keeps what it found before
     answer = robot.distances({}, ist.Obstacles(wall_pcd))
     assert len(text.splitlines()) == len(robot.links)
     for line, link, lower_bound in zip(text.splitlines(), robot.links, answer.lower_bound):
@@ -36,10 +33,9 @@ def test_planner(wall_pcd):
     assert 'at least' in text.splitlines()[1]
 
 
-def test_cluster(wall_pcd):
+def test_cluster(robot, wall_pcd):
     pytest.importorskip('dask.distributed')
     text = run('cluster.py', wall_pcd, '--count', 2000, '--workers', 2)
-    robot = ist.Robot(str(URDF))
     assert '2000 configurations: ' in text
     # The same samples here: 1000 of each of the seeds 0 and 1.
     low, high = np.maximum(robot.lower_limits, -np.pi), np.minimum(robot.upper_limits, np.pi)
