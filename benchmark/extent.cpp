@@ -10,7 +10,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <random>
@@ -21,10 +20,8 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
-#include "support/data_dir.h"
 #include "support/pcd.h"
 #include "support/scene.h"
-#include "truth_scenes.h"
 
 namespace {
 
@@ -437,17 +434,11 @@ std::string measure_real(const std::vector<std::string>& files, std::string* tab
 
 int main(int argc, char** argv) {
   const std::filesystem::path data = ist::benchmark::data_or_exit();
-  std::string document;
-  std::vector<std::string> files;
+  ist::benchmark::Arguments arguments(argc, argv);
+  const std::string document = arguments.text("update-doc");
+  std::vector<std::string> files = arguments.rest();
   for (const char* name : {"mosd0.pcd", "mosd10.pcd", "mosd40.pcd"}) {
     files.push_back((data / "clouds" / name).string());
-  }
-  for (int i = 1; i < argc; ++i) {
-    if (std::strcmp(argv[i], "--update-doc") == 0 && i + 1 < argc) {
-      document = argv[++i];
-    } else {
-      files.emplace_back(argv[i]);
-    }
   }
   const ist::SensorModel& model = *ist::find_sensor_model("kinect_v1");
   const Errors noise{model.noise_constant, model.noise_quadratic, 0.0, 0.0};

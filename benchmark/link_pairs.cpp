@@ -10,24 +10,20 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "document.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/robot/link_poses.h"
-#include "link_pairs/peers.h"
+#include "link_pairs/fcl.h"
 #include "link_pairs/robot.h"
 #include "support.h"
-#include "support/data_dir.h"
 #include "support/demo_arm.h"
 #include "support/link_pair_oracle.h"
 #include "support/scene.h"
-#include "truth_scenes.h"
 
 namespace {
 
@@ -35,7 +31,6 @@ using ist::LinkPair;
 using ist::LinkState;
 using ist::PairProximity;
 using ist::benchmark::make_robot;
-using ist::benchmark::PairPeer;
 using ist::benchmark::panda;
 using ist::benchmark::quantile;
 using ist::benchmark::Robot;
@@ -48,14 +43,7 @@ std::string ratio(double peer, double ours) {
   return text;
 }
 
-std::vector<std::unique_ptr<PairPeer>> make_peers([[maybe_unused]] const Robot& robot) {
-#ifdef IST_PROXIMITY_HAS_FCL
-  if (robot.is_meshes) return ist::benchmark::fcl_peers(robot);  // it would measure other shapes
-#endif
-  return {};
-}
-
-// Times and answers of one library.
+// Times and answers of FCL.
 struct Measured {
   std::vector<double> us;
   std::vector<double> distances;  // [m] by pair, of the last run
@@ -90,8 +78,11 @@ void measure_time(const Robot& robot, bool is_motion, unsigned seed, int count, 
     config.tolerance = tolerance;
     queries.push_back(std::make_unique<ist::SelfQuery>(robot.model, robot.pairs, config));
   }
-  const auto peers = make_peers(robot);
-  std::vector<Measured> measured(peers.size());
+  std::function<double(const LinkPair&, const std::vector<Eigen::Isometry3d>&)> fcl;
+#ifdef IST_PROXIMITY_HAS_FCL
+  if (robot.is_meshes) fcl = ist::benchmark::fcl_distances(robot);  // else it has other shapes
+#endif
+  Measured measured;
   ist::benchmark::ThreadTimer timer;
   std::vector<double> q = robot.random_position(&rng), to = robot.random_position(&rng);
   for (int i = 0; i < count; ++i) {
@@ -110,15 +101,12 @@ void measure_time(const Robot& robot, bool is_motion, unsigned seed, int count, 
                          static_cast<double>(robot.pairs.size()));
       steps.push_back(static_cast<double>(queries[k]->statistics().steps));
     }
-    if (is_motion && i % 100 > 0) continue;
-    for (std::size_t k = 0; k < peers.size(); ++k) {
-      measured[k].distances.resize(robot.pairs.size());
-      timer.lap();
-      peers[k]->run(poses.X_FL, &measured[k].distances);
-      const double us = timer.lap();
-      measured[k].us.push_back(us);
-      measured[k].compare(results);
-    }
+    if (!fcl || (is_motion && i % 100 > 0)) continue;
+    measured.distances.clear();
+    timer.lap();
+    for (const LinkPair& pair : robot.pairs) measured.distances.push_back(fcl(pair, poses.X_FL));
+    measured.us.push_back(timer.lap());
+    measured.compare(results);
   }
   char name[160], row[400];
   if (is_motion) {
@@ -127,13 +115,12 @@ void measure_time(const Robot& robot, bool is_motion, unsigned seed, int count, 
     std::snprintf(name, sizeof name, "%d random", count);
   }
   const double to_1_mm = quantile(ours[0], 0.5), exact = quantile(ours[1], 0.5);
-  const double of_peer = peers.empty() ? 0.0 : quantile(measured[0].us, 0.5);
+  const double of_peer = quantile(measured.us, 0.5);
   std::snprintf(row, sizeof row,
                 "| %s | %s | %.0f / %.0f | %.0f | %.0f | %.0f | %.0f | %s | %s | %d |\n",
                 robot.name.c_str(), name, to_1_mm, quantile(ours[0], 0.99), exact,
                 ist::benchmark::mean(searched), ist::benchmark::mean(steps), of_peer,
-                ratio(of_peer, to_1_mm).c_str(), ratio(of_peer, exact).c_str(),
-                peers.empty() ? 0 : measured[0].wrong);
+                ratio(of_peer, to_1_mm).c_str(), ratio(of_peer, exact).c_str(), measured.wrong);
   *rows += row;
   std::printf("%s", row);
   std::fflush(stdout);
@@ -223,7 +210,6 @@ std::string measure_accuracy(const Robot& robot, int configurations) {
   return rows;
 }
 
-// Each triangle in four.
 }  // namespace
 
 int main(int argc, char** argv) {

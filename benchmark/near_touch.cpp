@@ -21,7 +21,6 @@
 #include "peers/scene.h"
 #include "support.h"
 #include "support/whole_cloud.h"
-#include "truth_scenes.h"
 
 namespace {
 

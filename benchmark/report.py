@@ -110,21 +110,6 @@ def sources(rows):
     return list(dict.fromkeys((r["scene"], r["link"]) for r in rows))
 
 
-def near_table(rows):
-    cell = {(r["robot"], r["distance_mm"], r["tolerance_mm"], r["asked"]): r for r in rows}
-    lines = []
-    for robot in dict.fromkeys(r["robot"] for r in rows if "level" not in r["robot"]):
-        for distance in (300, 5, -1):
-            if (robot, distance, 1, "warm") in cell:
-                fine, exact = cell[robot, distance, 1, "warm"], cell[robot, distance, 0, "warm"]
-                lines.append([robot, f"{distance:g} mm" if distance > 0 else f"{-distance:g} mm deep",
-                              f"{time(fine['median_us'])} / {time(fine['p99_us'])}",
-                              time(cell[robot, distance, 1, "new image"]["median_us"]),
-                              f"{time(exact['median_us'])} / {time(exact['p99_us'])}"])
-    return table(["robot", "nearest link", "to 1 mm", "new image", "exact"],
-                 lines)
-
-
 def checks(rows, keys):
     """The answers that were checked, once for each setting."""
     once = {tuple(r.get(k) for k in keys): r for r in rows}.values()
@@ -154,14 +139,18 @@ def deadline_table(rows):
             f"\nOf {stopped:,.0f} stopped queries, single bodies included, {wrong:,.0f} had a wrong bound.\n")
 
 
-class Drawing:
-    """Parts of an SVG, with a logarithmic axis of times upwards. What derives from it has the sizes
-    and `y`, the range of the times' decimal logarithms."""
+class Plot:
+    """Speed against error, both axes logarithmic, as SVG."""
+
+    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 520, 80, 30, 40, 60
+    COLOURS = {"ours": "#c0392b", "exact": "#2c3e50", "spheres": "#2980b9", "grid": "#8e44ad"}
+    FLOOR_MM = 0.01  # exact to float: drawn here
 
     def __init__(self, rows, title):
-        self.rows = rows
-        self.title = title
-        self.parts = []
+        self.rows, self.title, self.parts = rows, title, []
+        times = [r["free_query_us"] for r in self.rows]
+        self.y = (math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
+        self.x = (math.log10(self.FLOOR_MM) - 0.3, 3.0)  # room for labels
 
     def py(self, us):
         share = (math.log10(us) - self.y[0]) / (self.y[1] - self.y[0])
@@ -176,20 +165,6 @@ class Drawing:
                 'font-family="sans-serif" font-size="12">\n'
                 '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(self.parts) +
                 "\n</svg>\n")
-
-
-class Plot(Drawing):
-    """Speed against error, both axes logarithmic."""
-
-    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 520, 80, 30, 40, 60
-    COLOURS = {"ours": "#c0392b", "exact": "#2c3e50", "spheres": "#2980b9", "grid": "#8e44ad"}
-    FLOOR_MM = 0.01  # exact to float: drawn here
-
-    def __init__(self, rows, title):
-        super().__init__(rows, title)
-        times = [r["free_query_us"] for r in self.rows]
-        self.y = (math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
-        self.x = (math.log10(self.FLOOR_MM) - 0.3, 3.0)  # room for labels
 
     def px(self, mm):
         share = (math.log10(max(mm, self.FLOOR_MM)) - self.x[0]) / (self.x[1] - self.x[0])
@@ -286,8 +261,6 @@ def report_hard(arguments, run):
              "benchmark hard checks": checks(hard + near, (
                  "scene", "link", "points", "noise_mm", "robot", "distance_mm", "tolerance_mm")),
              "benchmark deadline": deadline_table(deadline)}
-    if near:
-        parts["benchmark near"] = near_table(near)
     fill(arguments.folder / "benchmark.md", parts)
 
 

@@ -4,8 +4,6 @@
 // Usage: self_contact [--places N] [--seconds N] [--seeds N] [--update-doc doc/sources.md]
 
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <functional>
 #include <future>
 #include <memory>
@@ -14,6 +12,7 @@
 
 #include "document.h"
 #include "self_view.h"
+#include "support.h"
 #include "support/demo_arm.h"
 #include "touch_view.h"
 
@@ -74,29 +73,18 @@ std::string rows(const ist::RobotDescription& robot,
 
 int main(int argc, char** argv) {
   Config config;
-  std::string document;
-  int seeds = 4;
-  for (int i = 1; i < argc; ++i) {
-    const bool has_value = i + 1 < argc;
-    if (std::strcmp(argv[i], "--places") == 0 && has_value) {
-      config.touch.places = std::atoi(argv[++i]);
-    } else if (std::strcmp(argv[i], "--seconds") == 0 && has_value) {
-      config.view.duration = std::atof(argv[++i]);
-    } else if (std::strcmp(argv[i], "--seeds") == 0 && has_value) {
-      seeds = std::atoi(argv[++i]);
-    } else if (std::strcmp(argv[i], "--update-doc") == 0 && has_value) {
-      document = argv[++i];
-    } else {
-      std::fprintf(stderr, "unknown argument: %s\n", argv[i]);
-      return 1;
-    }
-  }
+  ist::benchmark::Arguments arguments(argc, argv);
+  config.touch.places = static_cast<int>(arguments.number("places", config.touch.places));
+  config.view.duration = arguments.number("seconds", config.view.duration);
+  const std::size_t seeds = arguments.count("seeds", 4);
+  const std::string document = arguments.text("update-doc");
+  arguments.rest();
   const ist::RobotDescription robot = ist::test::demo_robot();
   const auto model = ist::build_robot_model(robot, {});
   std::vector<std::future<std::string>> runs;
-  for (int seed = 1; seed <= seeds; ++seed) {
-    runs.push_back(std::async(std::launch::async, rows, std::cref(robot), std::cref(model), config,
-                              static_cast<std::uint64_t>(seed)));
+  for (std::size_t seed = 1; seed <= seeds; ++seed) {
+    runs.push_back(
+        std::async(std::launch::async, rows, std::cref(robot), std::cref(model), config, seed));
   }
   std::string table =
       "| mode | seed | correction at the arm | told while it touches | places | mean distance told "

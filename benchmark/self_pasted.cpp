@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <limits>
 #include <memory>
 #include <random>
@@ -22,7 +20,6 @@
 #include "ist_proximity/robot/link_poses.h"
 #include "peers/scene.h"
 #include "support.h"
-#include "truth_scenes.h"
 
 namespace {
 
@@ -184,20 +181,15 @@ std::string rows(const Scene& scene, const std::shared_ptr<const ist::RobotModel
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::string document;
-  std::size_t images = 180;
-  for (int i = 2; i + 1 < argc; i += 2) {
-    if (std::strcmp(argv[i], "--images") == 0) {
-      images = static_cast<std::size_t>(std::atoi(argv[i + 1]));
-    } else if (std::strcmp(argv[i], "--update-doc") == 0) {
-      document = argv[i + 1];
-    }
-  }
-  if (argc < 2 || argc % 2 != 0) {
+  ist::benchmark::Arguments arguments(argc, argv);
+  const std::size_t images = arguments.count("images", 180);
+  const std::string document = arguments.text("update-doc");
+  if (arguments.rest().size() != 1) {
     std::fprintf(stderr, "Usage: self_pasted CACHE_FOLDER [--images N] [--update-doc FILE]\n");
     return 2;
   }
-  const DataSet set = ist::benchmark::kinect_data(ist::benchmark::data_or_exit(), argv[1]);
+  const DataSet set =
+      ist::benchmark::kinect_data(ist::benchmark::data_or_exit(), arguments.rest()[0]);
   const auto model = set.robot.pack(ist::PackingConfig().max_error);
   std::string table =
       "| frame | mode | links within 5 mm of the scene: told | links 3 cm from it and more: told | "

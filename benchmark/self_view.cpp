@@ -8,14 +8,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <iterator>
 #include <string>
 #include <vector>
 
 #include "document.h"
 #include "ist_proximity/cloud/ingest.h"
+#include "support.h"
 #include "support/demo_arm.h"
 
 namespace {
@@ -60,18 +59,10 @@ std::string row(const Case& c, const std::vector<ist::sim::SelfViewResult>& resu
 int main(int argc, char** argv) {
   ist::sim::SelfViewConfig config;
   config.paddings.assign(std::begin(kPaddings), std::end(kPaddings));
-  std::string document;
-  for (int i = 1; i < argc; ++i) {
-    const bool has_value = i + 1 < argc;
-    if (std::strcmp(argv[i], "--seconds") == 0 && has_value) {
-      config.duration = std::atof(argv[++i]);
-    } else if (std::strcmp(argv[i], "--update-doc") == 0 && has_value) {
-      document = argv[++i];
-    } else {
-      std::fprintf(stderr, "unknown argument: %s\n", argv[i]);
-      return 1;
-    }
-  }
+  ist::benchmark::Arguments arguments(argc, argv);
+  config.duration = arguments.number("seconds", config.duration);
+  const std::string document = arguments.text("update-doc");
+  arguments.rest();
   const ist::RobotDescription robot = ist::test::demo_robot();
   const auto model = ist::build_robot_model(robot, {});
   std::string table = head();

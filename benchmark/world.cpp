@@ -23,7 +23,7 @@
 #include "support/meshes.h"
 #include "support/scene.h"
 #ifdef IST_PROXIMITY_HAS_FCL
-#include <fcl/fcl.h>
+#include "fcl_geometry.h"
 #endif
 
 namespace {
@@ -64,26 +64,6 @@ LinkGeometry as_meshes(const LinkGeometry& geometry) {
 #ifdef IST_PROXIMITY_HAS_FCL
 using FclObject = std::unique_ptr<fcl::CollisionObjectd>;
 
-std::shared_ptr<fcl::CollisionGeometryd> fcl_geometry(const ist::Shape& shape) {
-  if (const auto* box = std::get_if<ist::Box>(&shape)) {
-    return std::make_shared<fcl::Boxd>(box->size);
-  }
-  if (const auto* cylinder = std::get_if<ist::Cylinder>(&shape)) {
-    return std::make_shared<fcl::Cylinderd>(cylinder->radius, cylinder->length);
-  }
-  if (const auto* sphere = std::get_if<ist::Sphere>(&shape)) {
-    return std::make_shared<fcl::Sphered>(sphere->radius);
-  }
-  const auto& mesh = std::get<ist::TriangleMesh>(shape);
-  std::vector<fcl::Triangle> faces;
-  for (const auto& t : mesh.triangles) faces.emplace_back(t[0], t[1], t[2]);
-  auto model = std::make_shared<fcl::BVHModel<fcl::OBBRSSd>>();
-  model->beginModel();
-  model->addSubModel(mesh.vertices, faces);
-  model->endModel();
-  return model;
-}
-
 // The elements of links or objects, each at its place in its body.
 struct FclBodies {
   std::vector<FclObject> objects;
@@ -92,7 +72,8 @@ struct FclBodies {
 
   void add(const LinkGeometry& geometry, std::size_t of, const Eigen::Isometry3d& X) {
     for (const ist::GeometryElement& element : geometry) {
-      objects.push_back(std::make_unique<fcl::CollisionObjectd>(fcl_geometry(element.shape)));
+      objects.push_back(
+          std::make_unique<fcl::CollisionObjectd>(ist::benchmark::fcl_geometry(element.shape)));
       body.push_back(of);
       X_BE.push_back(X * element.X_LE);
     }

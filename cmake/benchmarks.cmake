@@ -50,17 +50,14 @@ find_library(FCL_LIBRARY fcl)
 find_library(CCD_LIBRARY ccd)
 mark_as_advanced(FCL_INCLUDE_DIR FCL_LIBRARY CCD_LIBRARY)
 if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
-  target_compile_definitions(benchmark_link_pairs PRIVATE IST_PROXIMITY_HAS_FCL)
   target_sources(benchmark_link_pairs PRIVATE benchmark/link_pairs/fcl.cpp)
-  target_include_directories(benchmark_link_pairs SYSTEM PRIVATE
-    ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
-  target_link_libraries(benchmark_link_pairs PRIVATE
-    ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
-  target_compile_definitions(benchmark_world PRIVATE IST_PROXIMITY_HAS_FCL)
-  target_include_directories(benchmark_world SYSTEM PRIVATE
-    ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
-  target_link_libraries(benchmark_world PRIVATE
-    ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
+  foreach(name link_pairs world)
+    target_compile_definitions(benchmark_${name} PRIVATE IST_PROXIMITY_HAS_FCL)
+    target_include_directories(benchmark_${name} SYSTEM PRIVATE
+      ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
+    target_link_libraries(benchmark_${name} PRIVATE
+      ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
+  endforeach()
 else()
   message(STATUS "ist_proximity: benchmark/link_pairs and world without FCL (apt install libfcl-dev)")
 endif()

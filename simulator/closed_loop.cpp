@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "internal/cloud/memory_scan.h"
-#include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/robot/link_poses.h"
 
 namespace ist::sim {
@@ -48,26 +47,6 @@ double quantile(std::vector<double> values, double q) {
   std::nth_element(values.begin(), values.begin() + at, values.end());
   return values[static_cast<std::size_t>(at)];
 }
-
-/// Measures the distances between the robot's own links.
-class SelfWatch {
- public:
-  SelfWatch(const std::shared_ptr<const RobotModel>& model, const Kinematics& kinematics)
-      : known_(model->links.size(), true),
-        query_(model, self_collision_pairs(*model, kinematics, known_, {}), {}) {}
-
-  double smallest(const std::vector<Eigen::Isometry3d>& X_FL) {
-    query_.run(X_FL, known_, &results_);
-    double distance = std::numeric_limits<double>::infinity();
-    for (const PairProximity& pair : results_) distance = std::min(distance, pair.lower_bound);
-    return distance;
-  }
-
- private:
-  std::vector<bool> known_;
-  SelfQuery query_;
-  std::vector<PairProximity> results_;
-};
 
 std::vector<std::string> link_names(const RobotModel& model) {
   std::vector<std::string> names;
@@ -196,7 +175,6 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
   result.task_time = std::numeric_limits<double>::infinity();
   std::vector<Eigen::VectorXd> accelerations;
   std::vector<double> command_steps;
-  SelfWatch self(model, arm.kinematics);
   std::size_t goal = 1 % scene.goals.size();
   Eigen::VectorXd command = Eigen::VectorXd::Zero(scene.goals[0].size());
   for (int step = 0; world.time() < scene.duration ||
@@ -217,10 +195,6 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
     }
     world.step(command);
     accelerations.push_back(world.arm().accelerations());
-    if (config.check_self && step % 20 == 0) {
-      result.smallest_self_distance =
-          std::min(result.smallest_self_distance, self.smallest(world.link_poses()));
-    }
     note_distance(world, robot, scene, &result);
   }
   result.acceleration_noise = noise(accelerations);

@@ -30,7 +30,6 @@ enum class Avoidance {
 struct ClosedLoopConfig {
   Avoidance avoidance = Avoidance::kBlend;
   bool scale_speed = true;  ///< the task's speed is multiplied by the speed scale
-  bool check_self = false;  ///< measure the distances between links, too
   int control_period = 2;   ///< [simulation steps] between two queries and commands
   example::DodgeConfig controller;
   IngestConfig ingest;
@@ -91,9 +90,6 @@ struct ClosedLoopResult {
   double task_time = 0.0;          ///< [s] when the task was done; inf: it was not
   /// [rad/s] of the fastest joint at the first touch; 0 without any.
   double speed_at_touch = 0.0;
-  /// [m] Smallest lower bound of the distance of two links that may collide, every 20 ms; the
-  /// controller ignores it. Inf unless `check_self` asks for it.
-  double smallest_self_distance = std::numeric_limits<double>::infinity();
   /// [rad/s^2] Root mean square, over joints and steps, of the acceleration's deviation from its
   /// moving average over 0.1 s.
   double acceleration_noise = 0.0;

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +12,7 @@
 #include "support/data_dir.h"
 #include "support/link_pair_oracle.h"
 #include "support/scene.h"
+#include "support/truth.h"
 
 namespace ist::benchmark {
 
@@ -69,12 +68,7 @@ inline Robot make_robot(std::string name, ist::RobotDescription description) {
 
 inline Robot panda(const std::filesystem::path& data, ist::GeometrySource source,
                    std::string name) {
-  const std::string package = ist::test::franka_package(data);
-  std::ifstream file(package + "/robots/panda.urdf");
-  std::stringstream text;
-  text << file.rdbuf();
-  return make_robot(std::move(name), ist::parse_urdf(text.str(), source,
-                                                     [&](const std::string&) { return package; }));
+  return make_robot(std::move(name), ist::test::read_panda(data, source));
 }
 
 }  // namespace ist::benchmark
