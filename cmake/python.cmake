@@ -42,12 +42,12 @@ set_target_properties(ist_proximity_python PROPERTIES
 install(TARGETS ist_proximity_python LIBRARY DESTINATION ${python_destination})
 if(catkin_FOUND)
   # The generated messages' rule installs the modules, which are in one folder with them.
-  catkin_install_python(PROGRAMS scripts/proximity_report
+  catkin_install_python(PROGRAMS src/tools/proximity_report
     DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 else()
   install(DIRECTORY python/ist_proximity/ DESTINATION ${python_destination}
     FILES_MATCHING PATTERN "*.py")
-  install(PROGRAMS scripts/proximity_report DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(PROGRAMS src/tools/proximity_report DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
 # Its tests, with pytest.

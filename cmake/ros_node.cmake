@@ -58,8 +58,8 @@ install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION
 install(DIRECTORY config demo examples launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}
   USE_SOURCE_PERMISSIONS
   PATTERN __pycache__ EXCLUDE)
-# The script in the repository is not executable: rosrun would find two programs of that name.
-catkin_install_python(PROGRAMS scripts/proximity_table scripts/proximity_rviz
+# Those in the repository are not executable: rosrun would find two programs of a name.
+catkin_install_python(PROGRAMS src/nodes/proximity_table src/nodes/proximity_rviz
   src/nodes/planning_scene_bridge
   src/nodes/trajectory_bridge
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

@@ -1,7 +1,6 @@
 """The report: what it says of the demo's arm, and its messages for input that is wrong."""
 
 import html.parser
-import os
 import pathlib
 import subprocess
 import sys
@@ -13,12 +12,11 @@ from ist_proximity.report import measure
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 URDF = ROOT / 'demo' / 'demo_arm.urdf'
-ENVIRONMENT = {**os.environ, 'ROS_PACKAGE_PATH': str(ROOT)}
 
 
 def run(*arguments):
-    return subprocess.run([sys.executable, ROOT / 'scripts' / 'proximity_report', *map(str, arguments)],
-                          check=False, capture_output=True, text=True, timeout=200, env=ENVIRONMENT)
+    return subprocess.run([sys.executable, ROOT / 'src' / 'tools' / 'proximity_report', *map(str, arguments)],
+                          check=False, capture_output=True, text=True, timeout=200)
 
 
 class Page(html.parser.HTMLParser):
