@@ -28,6 +28,10 @@ constexpr char kSingle[] =
     "\n# The single source, the sensor_msgs/PointCloud2 on the topic `cloud`. With `sources`, "
     "these are\n"
     "# the defaults of its entries.\n\n";
+constexpr char kZones[] =
+    "\n# Zones whose points are no obstacles, for the links that are named, or for all.\n"
+    "# zones:\n#   bin: {frame_id: bin, shape: box, size: [0.4, 0.6, 0.3], links: [finger_link], "
+    "lifetime: 60}\n";
 constexpr char kSources[] =
     "\n# One entry for each sensor, map or known world, in place of the single source. What stands "
     "above\n"
@@ -104,6 +108,7 @@ std::string parameter_text() {
   ServerConfig config;
   SourceConfig single;
   std::string text = kTop + yaml_of(node_parameters(&config), "", "", &seen);
+  text += kZones;
   text += kSingle + yaml_of(source_parameters("", &single), "", "", &seen) + kSources;
   for (int i = 0; i <= static_cast<int>(SourceType::kWorld); ++i) {
     SourceConfig source;
