@@ -30,11 +30,10 @@ constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
 
 /// A group is a dictionary, without the dictionaries in it.
 std::vector<Parameter> rows_of(const std::string& group, ServerConfig* config) {
-  std::vector<Parameter> rows = live_parameters(config);
-  const auto is_other = [&group](const Parameter& row) {
-    return row.name.compare(0, row.name.rfind('/'), group) != 0;
-  };
-  rows.erase(std::remove_if(rows.begin(), rows.end(), is_other), rows.end());
+  std::vector<Parameter> rows;
+  for (const Parameter& row : live_parameters(config)) {
+    if (row.name.compare(0, row.name.rfind('/'), group) == 0) rows.push_back(row);
+  }
   return rows;
 }
 
@@ -55,9 +54,9 @@ Config config_of(const std::vector<Parameter>& rows,
       config.doubles.back().value = number(row);
     }
   }
-  config.groups.emplace_back();
-  config.groups.back().name = kOnlyGroup;
-  config.groups.back().state = true;
+  config.groups.resize(1);
+  config.groups[0].name = kOnlyGroup;
+  config.groups[0].state = true;
   return config;
 }
 
@@ -72,15 +71,15 @@ ConfigDescription describe(const std::vector<Parameter>& defaults,
   all.max = config_of(live, [max_distance](const Parameter& row) {
     return std::max(row.number(), row.slider > 0.0 ? row.slider : max_distance);
   });
-  all.groups.emplace_back();
-  all.groups.back().name = kOnlyGroup;
+  all.groups.resize(1);
+  all.groups[0].name = kOnlyGroup;
   for (const Parameter& row : defaults) {
     dynamic_reconfigure::ParamDescription one;
     one.name = name_in_group(row);
     one.type = row.is_bool() ? "bool" : "double";
     const std::string unit = row.range.unit;
     one.description = "~" + row.name + (unit.empty() ? ": " : " [" + unit + "]: ") + row.help;
-    all.groups.back().parameters.push_back(one);
+    all.groups[0].parameters.push_back(one);
   }
   return all;
 }
