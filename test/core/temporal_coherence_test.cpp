@@ -91,18 +91,19 @@ struct Motion {
                   direction = Eigen::Vector3d::UnitX();
 };
 
-test::Truth least_of(const std::vector<test::Truth>& truth) {
+void expect_minimum(const RobotProximity& robot, const std::vector<test::Truth>& truth,
+                    const Motion& motion, const QueryConfig& config) {
   test::Truth least{kInfinity, kInfinity};
   for (const test::Truth& one : truth) {
     least = {std::min(least.measured, one.measured), std::min(least.stored, one.stored)};
   }
-  return least;
+  const auto i = static_cast<std::size_t>(std::max(robot.link, 0));
+  test::expect_truth(robot.nearest, least, config, motion.X_FL[i]);
 }
 
 class CoherentQueries : public ::testing::TestWithParam<double> {};
 
-// All kinds of queries in turn, of one query object. A deadline may stop a query anywhere: its
-// bounds and those of later ones hold.
+// All kinds of queries in turn, of one query object.
 TEST_P(CoherentQueries, BoundsHoldOnLongMotions) {
   Motion motion(static_cast<std::uint64_t>(62 + 1e4 * GetParam()));
   QueryConfig config;
@@ -113,49 +114,72 @@ TEST_P(CoherentQueries, BoundsHoldOnLongMotions) {
   const std::vector<bool> known(count, true);
   std::vector<LinkProximity> results;
   RobotProximity robot;
-  int contact = 0, stopped = 0, steps = test::scaled(1200);
-  const auto check = [&](bool complete, const LinkProximity& answer, const test::Truth& truth,
-                         const Eigen::Isometry3d& X_FL) {
-    contact += answer.state == LinkState::kContact ? 1 : 0;
-    stopped += complete ? 0 : 1;
-    if (complete) return test::expect_truth(answer, truth, config, X_FL);
-    const double side = std::abs(truth.measured) < 2e-8 ? 2e-8 : 0.0;
-    EXPECT_LE(answer.lower_bound, truth.measured + side);
-  };
+  int contact = 0, steps = test::scaled(1200);
   for (int step = 0; step < steps && !::testing::Test::HasFailure(); ++step) {
     SCOPED_TRACE("step " + std::to_string(step));
     motion.step();
-    config.deadline =
-        step % 3 == 0 ? 1e-6 * std::pow(10.0, test::uniform(&motion.rng, -1.0, 2.5)) : 0.0;
-    query.set_config(config);
     std::vector<test::Truth> truth;
     for (std::size_t i = 0; i < count; ++i) {
       truth.push_back(test::truth_of(links().link(i), motion.X_FL[i], motion.points, motion.cloud));
     }
     const int kind = static_cast<int>(test::uniform(&motion.rng, 0.0, 4.0));
-    bool complete = false;
     if (kind == 0) {
-      complete = query.run(motion.X_FL, known, {&motion.cloud}, &results);
+      ASSERT_TRUE(query.run(motion.X_FL, known, {&motion.cloud}, &results));
       for (std::size_t i = 0; i < count; ++i) {
-        check(complete, results[i], truth[i], motion.X_FL[i]);
+        test::expect_truth(results[i], truth[i], config, motion.X_FL[i]);
+        contact += results[i].state == LinkState::kContact ? 1 : 0;
       }
     } else if (kind == 1) {
       const std::size_t i = motion.rng() % count;
       results.resize(1);
-      complete = query.run_link(i, motion.X_FL[i], {&motion.cloud}, &results[0]);
-      check(complete, results[0], truth[i], motion.X_FL[i]);
+      ASSERT_TRUE(query.run_link(i, motion.X_FL[i], {&motion.cloud}, &results[0]));
+      test::expect_truth(results[0], truth[i], config, motion.X_FL[i]);
     } else {
-      complete = query.run_minimum(motion.X_FL, known, {&motion.cloud}, &robot);
-      const auto i = static_cast<std::size_t>(std::max(robot.link, 0));
-      check(complete, robot.nearest, least_of(truth), motion.X_FL[i]);
+      ASSERT_TRUE(query.run_minimum(motion.X_FL, known, {&motion.cloud}, &robot));
+      expect_minimum(robot, truth, motion, config);
     }
-    EXPECT_TRUE(complete || config.deadline > 0.0);
   }
   EXPECT_GT(contact, steps / 50);
-  EXPECT_GT(stopped, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, CoherentQueries, ::testing::Values(0.0, 0.001, 0.02));
+
+// A deadline may stop a query anywhere. The bounds of this query and of later ones hold.
+TEST(CoherentQueries, BoundsHoldAfterDeadlines) {
+  Motion motion(63);
+  QueryConfig config;
+  ProximityQuery query(links().shared_model(), config);
+  const std::size_t count = motion.X_FL.size();
+  const std::vector<bool> known(count, true);
+  std::vector<LinkProximity> results;
+  RobotProximity robot;
+  int stopped = 0;
+  for (int step = 0; step < test::scaled(900); ++step) {
+    motion.step();
+    config.deadline =
+        step % 3 == 0 ? 0.0 : 1e-6 * std::pow(10.0, test::uniform(&motion.rng, -1.0, 2.5));
+    query.set_config(config);
+    const bool all = step % 2 == 0;
+    const bool complete = all ? query.run(motion.X_FL, known, {&motion.cloud}, &results)
+                              : query.run_minimum(motion.X_FL, known, {&motion.cloud}, &robot);
+    stopped += complete ? 0 : 1;
+    double least = kInfinity;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double truth =
+          test::truth_of(links().link(i), motion.X_FL[i], motion.points, motion.cloud).measured;
+      least = std::min(least, truth);
+      if (!all) continue;
+      ASSERT_LE(results[i].lower_bound, truth + (std::abs(truth) < 2e-8 ? 2e-8 : 0.0))
+          << "step " << step;
+      if (complete) ASSERT_LE(results[i].distance, truth + config.tolerance + 1e-6);
+    }
+    if (all) continue;
+    ASSERT_LE(robot.nearest.lower_bound, least + (std::abs(least) < 2e-8 ? 2e-8 : 0.0))
+        << "step " << step;
+    if (complete) ASSERT_LE(robot.nearest.distance, least + config.tolerance + 1e-6);
+  }
+  EXPECT_GT(stopped, 0);
+}
 
 // A point passes through the opening of a box, where its signed distance jumps, while another point
 // or another link is the nearest.
