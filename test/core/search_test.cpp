@@ -124,7 +124,7 @@ TEST(SearchFront, AnswersHoldAlongAMotion) {
   std::vector<LinkGeometry> links = test::random_links(&rng);
   links.push_back(test::one(test::open_box({0.2, 0.2, 0.2})));
   const auto model = test::with_fields(test::model_of(links, 0.02));
-  int near = 0, contacts = 0;
+  int answers = 0, near = 0, contacts = 0;
   for (std::size_t i = 0; i < links.size(); ++i) {
     for (const double tolerance : {0.0, 0.001}) {
       QueryConfig config;
@@ -155,13 +155,14 @@ TEST(SearchFront, AnswersHoldAlongAMotion) {
           EXPECT_LE(result.lower_bound, std::max(truth.measured, truth.stored) + kRounding);
         }
         if (HasFailure()) return;
+        ++answers;
         near += result.state == LinkState::kNear ? 1 : 0;
         contacts += result.state == LinkState::kContact ? 1 : 0;
       }
     }
   }
-  EXPECT_GT(near, 300);
-  EXPECT_GT(contacts, 100);
+  EXPECT_GT(5 * near, answers);
+  EXPECT_GT(20 * contacts, answers);
 }
 
 // A box dips into a plane of points, a little tilted otherwise each time: a point that was inside
