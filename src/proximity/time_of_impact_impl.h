@@ -14,7 +14,7 @@
 
 namespace ist {
 
-/// What a link may touch.
+/// The obstacles of a link on its way.
 struct ImpactObstacles {
   SnapshotSpan clouds;
   Span<const PosedWorld* const> worlds;

@@ -35,7 +35,7 @@ struct StraightPieces {
 /// Thread safe.
 StraightPieces straight_pieces(const JointTrajectory& trajectory, double max_deviation = 5e-4);
 
-/// What is proven of a link along a trajectory.
+/// The proven clearance of a link along a trajectory.
 struct LinkClearance {
   /// [s] of the trajectory, never later than the first contact; the first time that was asked for
   /// where there is contact then, +inf without contact, NaN when not known.

@@ -33,7 +33,7 @@ class ZoneFilter {
   /// @param extent  of the points, with the sensor's place
   void begin_cloud(const Eigen::Isometry3d& X_FO, const PointExtent& extent);
 
-  /// What is known of the points of a box, taken for a sphere.
+  /// The verdict about the points of a box, taken for a sphere.
   Verdict test(const PaddedBox& box) const;
   /// Bit k: the point in slot k is left out.
   std::uint32_t points_left_out(const PointTile& tile) const;

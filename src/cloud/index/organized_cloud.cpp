@@ -112,7 +112,7 @@ class OrganizedReader {
     counts_.in_zones += static_cast<std::uint32_t>(std::bitset<32>(kept).count());
   }
 
-  // What drops the points of a tile that one of the filters has left undecided.
+  // Drops the points of a tile that one of the filters has left undecided.
   // @param is_read  the tile is read as it is, in the box that the self-filter has tested last
   const PointFilter& filter_for(SelfFilter::Verdict robot, bool is_in_zone, bool is_read) const {
     static const PointFilter kDropNone;

@@ -14,7 +14,7 @@
 
 namespace ist {
 
-/// What is left out of an index. Each may be null.
+/// The filters whose points an index leaves out. Each may be null.
 struct CloudFilters {
   SelfFilter* on_robot = nullptr;
   /// In place of all that is within the self-filter's padding, what the view filter, which
