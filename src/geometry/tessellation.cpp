@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <utility>
+#include <variant>
 
 #include "internal/geometry/numbers.h"
 
@@ -157,6 +158,17 @@ Tessellation tessellate(const Sphere& sphere, double max_deviation) {
   for (Eigen::Vector3d& v : result.mesh.vertices) v *= sphere.radius * (1.0 - kInset);
   result.deviation = sphere.radius * (result.deviation + 2.0 * kInset);
   return result;
+}
+
+TriangleMesh mesh_of(const Shape& shape, double share) {
+  if (const auto* box = std::get_if<Box>(&shape)) return tessellate(*box).mesh;
+  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
+    return tessellate(*cylinder, share * cylinder->radius).mesh;
+  }
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) {
+    return tessellate(*sphere, share * sphere->radius).mesh;
+  }
+  return std::get<TriangleMesh>(shape);
 }
 
 }  // namespace ist

@@ -129,7 +129,7 @@ class TimeOfImpact::Impl::Piece {
       advance->is_over = true;
       return false;
     }
-    // Where others were nearer, this distance need not be known better.
+    // This distance need not be known better than those where others were nearer.
     const double step = std::max(kLeastStep + tube, kShareOfDistance * distance);
     advance->allowance = std::max(distance - advance->least, std::min(step, distance));
     advance->tolerance = std::min(kFirstTolerance, kRelativeTolerance * distance);

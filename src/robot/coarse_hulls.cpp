@@ -16,6 +16,7 @@ constexpr double kShareInside = 0.4;
 // A hull and its link are of one size, while a mark of a frame, or a sensor in a base, is small.
 constexpr double kSmallestRatio = 1.0 / 3.0;  // of diagonals
 constexpr std::size_t kSamples = 2000;        // triangles of a mesh that are looked at
+constexpr double kDeviation = 0.05;           // of those of a primitive, of its radius
 
 // A link as it is drawn.
 struct Drawing {
@@ -34,19 +35,9 @@ struct Drawing {
 
 using JointOfChild = std::map<std::string, const JointDescription*>;
 
-TriangleMesh mesh_of(const Shape& shape) {
-  constexpr double kDeviation = 0.05;  // of the radius
-  if (const auto* box = std::get_if<Box>(&shape)) return tessellate(*box).mesh;
-  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
-    return tessellate(*cylinder, kDeviation * cylinder->radius).mesh;
-  }
-  const auto& sphere = std::get<Sphere>(shape);
-  return tessellate(sphere, kDeviation * sphere.radius).mesh;
-}
-
 void add_element(const GeometryElement& element, Drawing* drawing) {
   const auto* given = std::get_if<TriangleMesh>(&element.shape);
-  const TriangleMesh made = given == nullptr ? mesh_of(element.shape) : TriangleMesh();
+  const TriangleMesh made = given == nullptr ? mesh_of(element.shape, kDeviation) : TriangleMesh();
   const TriangleMesh& mesh = given == nullptr ? made : *given;
   if (given != nullptr) drawing->triangles += mesh.triangles.size();
   const std::size_t step = 1 + mesh.triangles.size() / kSamples;

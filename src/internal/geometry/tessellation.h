@@ -20,4 +20,8 @@ Tessellation tessellate(const Cylinder& cylinder, double max_deviation);
 /// An inscribed icosphere of at most `max_deviation` [m] (capped at 5 subdivisions).
 Tessellation tessellate(const Sphere& sphere, double max_deviation);
 
+/// The triangles of any shape: a mesh's own, or those of the meshes above, which are off by at most
+/// a share of the primitive's radius.
+TriangleMesh mesh_of(const Shape& shape, double share);
+
 }  // namespace ist

@@ -102,7 +102,7 @@ const SourceSnapshot* CloudSelection::newest(const CloudSources& sources, std::s
 ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer) const {
   const auto cloud = static_cast<std::size_t>(answer.source);
   if (answer.source < 0 || cloud >= clouds_.size()) return {};
-  // What is in zones is of the same measurement.
+  // The points in zones are of the same measurement.
   const int source = cloud_sources_[cloud];
   const CloudSnapshot& whole = selected_[static_cast<std::size_t>(source)]->cloud;
   return {source, obstacles_key({&whole}), whole.stamp, cloud_stands_still_[cloud]};

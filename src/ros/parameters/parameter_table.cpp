@@ -11,7 +11,7 @@
 namespace ist {
 namespace {
 
-// What is no parameter has its number in the configuration, and its reason here:
+// These numbers are no parameters: each stands in the configuration, and its reason here.
 // - RepulsionConfig::filter_time hides the step of a new cloud, and delays nothing else.
 // - SpeedScaleConfig: slow_distance, as a line is what controllers expect; self_stop_distance and
 //   self_free_distance, as distances from link to link have no noise and fit every arm.
@@ -227,7 +227,7 @@ std::vector<Parameter> sensor_parameters(const std::string& at, SourceConfig* so
   };
 }
 
-/// What clouds and depth images have besides. 10^9 voxels of a memory take 8.6 GB.
+/// The rows of clouds and depth images alone. 10^9 voxels of a memory take 8.6 GB.
 std::vector<Parameter> image_parameters(const std::string& at, SourceConfig* source) {
   SourceMemoryConfig& memory = source->memory;
   return {
@@ -251,7 +251,7 @@ std::vector<Parameter> image_parameters(const std::string& at, SourceConfig* sou
   };
 }
 
-/// What maps and known worlds have. A map has no sensor from which ranges count.
+/// The rows of maps and known worlds. A map has no sensor from which ranges count.
 std::vector<Parameter> map_parameters(const std::string& at, SourceConfig* source) {
   ExtentConfig& extent = source->ingest.extent;
   return {

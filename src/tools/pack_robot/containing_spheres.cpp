@@ -18,6 +18,7 @@ namespace {
 
 constexpr int kPointsOfSphere = 100;
 constexpr int kPointsOfLink = 5000;
+constexpr double kDeviation = 0.01;  // of the triangles of a primitive, of its radius
 
 using Points = std::vector<Eigen::Vector3d>;
 
@@ -30,26 +31,13 @@ double distance_to(const std::vector<LinkSphere>& spheres, const Eigen::Vector3d
   return least;
 }
 
-// The triangles of an element; those of a primitive are inscribed in it.
-TriangleMesh triangles_of(const Shape& shape) {
-  constexpr double kDeviation = 0.01;  // of the radius
-  if (const auto* box = std::get_if<Box>(&shape)) return tessellate(*box).mesh;
-  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
-    return tessellate(*cylinder, kDeviation * cylinder->radius).mesh;
-  }
-  if (const auto* sphere = std::get_if<Sphere>(&shape)) {
-    return tessellate(*sphere, kDeviation * sphere->radius).mesh;
-  }
-  return std::get<TriangleMesh>(shape);
-}
-
 // Points on the surface, spread by area. Points of an element that are inside another one are left
 // out: they are not on the surface of the link.
 Points surface_points(const Solid& solid, const LinkGeometry& geometry, std::mt19937* random) {
   std::vector<std::array<Eigen::Vector3d, 3>> triangles;
   std::vector<double> areas;
   for (const GeometryElement& element : geometry) {
-    const TriangleMesh mesh = triangles_of(element.shape);
+    const TriangleMesh mesh = mesh_of(element.shape, kDeviation);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       triangles.push_back({element.X_LE * mesh.corner(t, 0), element.X_LE * mesh.corner(t, 1),
                            element.X_LE * mesh.corner(t, 2)});
