@@ -86,16 +86,28 @@ double ramp(const SpeedScaleConfig& config, double stop, double free, double bou
   return config.slow_scale + (1.0 - config.slow_scale) * (bound - slow) / (free - slow);
 }
 
-// The scale that the separation distance allows; see SpeedScale.
-double separation_scale(const SeparationConfig& config, double bound, double obstacle_speed,
-                        double age) {
-  const double least = std::isnan(obstacle_speed) ? std::max(config.obstacle_speed, kWalkingSpeed)
-                                                  : std::max(config.obstacle_speed, obstacle_speed);
-  const double rest =
-      bound - least * time_to_stop(config, age) - config.intrusion - config.uncertainty;
-  const double time = config.reaction_time + age + 0.5 * config.stopping_time;
+// The largest k up to 1 with linear k + square k^2 <= rest, for factors that are not negative.
+double largest_share(double linear, double square, double rest) {
   if (!(rest > 0.0)) return 0.0;
-  return std::min(rest / std::max(time * config.robot_speed, 1e-9), 1.0);
+  const double root = std::sqrt(linear * linear + 4.0 * square * rest);
+  return std::min(2.0 * rest / std::max(linear + root, 1e-9), 1.0);
+}
+
+// The scale that the separation distance allows; see SpeedScale.
+double separation_scale(const SeparationConfig& config, double bound, const SpeedScaleInput& input,
+                        double age) {
+  const double least =
+      std::max(config.obstacle_speed,
+               std::isnan(input.obstacle_speed) ? kWalkingSpeed : input.obstacle_speed);
+  const double left = bound - config.intrusion - config.uncertainty;
+  const double reaction = config.reaction_time + age;
+  if (input.reach) {
+    const StoppingReach& reach = *input.reach;
+    return largest_share(reach.speed * reaction + least * reach.time, reach.distance,
+                         left - least * reaction);
+  }
+  return largest_share(config.robot_speed * (reaction + 0.5 * config.stopping_time), 0.0,
+                       left - least * time_to_stop(config, age));
 }
 
 // The scale that one link allows.
@@ -110,7 +122,7 @@ SpeedScaleAnswer scale_of_link(const SpeedScaleConfig& config, double stop, doub
   answer.rule = answer.scale <= 0.0 ? SpeedRule::kStop : SpeedRule::kSlow;
   if (answer.scale >= 1.0) answer.rule = SpeedRule::kFree;
   if (!config.separation.enabled) return answer;
-  const double allowed = separation_scale(config.separation, held, input.obstacle_speed, age);
+  const double allowed = separation_scale(config.separation, held, input, age);
   if (allowed < answer.scale) {
     answer.scale = allowed;
     answer.rule = SpeedRule::kSeparation;

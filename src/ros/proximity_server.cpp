@@ -194,9 +194,10 @@ void ProximityServer::Impl::publish(const ist_proximity::ProximityArrayConstPtr&
                                     bool is_of_cycle, const SpeedScaleConfig& speed_scale) {
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = is_of_cycle && self_proximity_ ? self_proximity_->newest() : nullptr;
-  summary_.publish(*message, self.get(), speed_scale, ros::Time::now());
-  publish_message(proximity_, message);
   const bool has_cycle = is_of_cycle && cycle_;
+  summary_.publish(*message, self.get(), speed_scale, ros::Time::now(),
+                   has_cycle ? cycle_->full_speed_reach() : Span<const StoppingReach>());
+  publish_message(proximity_, message);
   if (joint_repulsion_.getNumSubscribers() > 0) {
     ist_proximity::JointRepulsion efforts;
     efforts.header.stamp = message->header.stamp;

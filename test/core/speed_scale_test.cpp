@@ -158,7 +158,7 @@ TEST_F(OneLink, SeparationDistance) {
   config.separation.enabled = true;
   const SeparationConfig& s = config.separation;
   ASSERT_TRUE(config_errors(config, "", 3.0).empty());
-  // ISO/TS 15066, 5.5.4, forward: S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z.
+  // ISO 10218-2, forward: S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z.
   const auto distance = [&s](double v_r, double v_h, double age) {
     const double reaction = s.reaction_time + age;
     return v_h * (reaction + s.stopping_time) + v_r * reaction + 0.5 * v_r * s.stopping_time +
@@ -190,6 +190,40 @@ TEST_F(OneLink, SeparationDistance) {
   EXPECT_EQ(run(near(3.0), 1e6).scale, 0.0);
   // CLEAR proves max_distance, and no more.
   EXPECT_LT(run({LinkState::kClear, 0.5}, 0.05).scale, 1.0);
+}
+
+// What the link reaches takes the place of the robot's speed and of its stopping time.
+TEST_F(OneLink, SeparationDistanceByReach) {
+  config.hysteresis = 0.0;
+  config.separation.enabled = true;
+  const SeparationConfig& s = config.separation;
+  const StoppingReach reach{2.0, 0.4, 0.5};
+  // Forward: until it stands, at the scale k, obstacles come v_h (T_r + k t) nearer, and the link
+  // goes k v T_r + k^2 b.
+  const auto distance = [&](double k, double v_h, double age) {
+    const double reaction = s.reaction_time + age;
+    return v_h * (reaction + k * reach.time) + k * reach.speed * reaction + k * k * reach.distance;
+  };
+  const auto scale_at = [&](double bound, double v_h, double age) {
+    SpeedScaleInput input = near(bound);
+    input.obstacle_speed = v_h;
+    input.reach = reach;
+    return run(input, age).scale;
+  };
+  for (const double age : {0.0, 0.3}) {
+    for (const double k : {0.1, 0.5, 0.99}) {
+      EXPECT_NEAR(scale_at(distance(k, 1.6, age), 0.4, age), k, 1e-9);
+      EXPECT_NEAR(scale_at(distance(k, 2.5, age), 2.5, age), k, 1e-9);
+    }
+    EXPECT_EQ(scale_at(distance(0.0, 1.6, age), 0.4, age), 0.0);
+    EXPECT_EQ(scale_at(distance(1.0, 1.6, age) + 0.001, 0.4, age), 1.0);
+  }
+  // A reach that is not known allows nothing.
+  SpeedScaleInput input = near(2.0);
+  input.reach = StoppingReach();
+  EXPECT_EQ(run(input, 0.0).scale, 0.0);
+  input.reach->speed = 1.0;
+  EXPECT_EQ(run(input, 0.0).scale, 0.0);
 }
 
 TEST(SpeedScale, TheLinkThatAllowsLeastDecides) {

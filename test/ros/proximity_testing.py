@@ -456,6 +456,7 @@ def check_invariants(test, message, max_distance=1.0):
         if np.isfinite(rates[:2]).all():
             test.assertAlmostEqual(one.closing_speed, sum(rates[:2]), 9)
         test.assertFalse(one.time_to_contact < 0)
+        test.assertFalse(one.robot_future > one.lower_bound)
         parts = [one.interval_model, one.interval_tolerance, one.interval_sensor]
         if one.state in (LinkProximity.NEAR, LinkProximity.CONTACT):
             test.assertGreaterEqual(min(parts), 0.0)

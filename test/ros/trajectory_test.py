@@ -123,7 +123,7 @@ class TrajectoryTest(unittest.TestCase):
         )
 
     def test_contact_is_told_and_cancelled_in_time(self):
-        self.start(trajectory={"deceleration": 0.4, "cancel_topic": "arm/cancel"})
+        self.start(joint_deceleration=0.4, trajectory={"cancel_topic": "arm/cancel"})
         self.assertEqual(self.heard, [], "nobody has sent a trajectory")
         self.send()
         first = self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
@@ -189,7 +189,7 @@ class TrajectoryTest(unittest.TestCase):
         self.wait(lambda m: m.state == m.CLEAR, "that it has gone")
 
     def test_what_cannot_be_watched_is_unknown(self):
-        self.start(trajectory={"deceleration": 1.0, "cancel_topic": "arm/cancel"})
+        self.start(joint_deceleration=1.0, trajectory={"cancel_topic": "arm/cancel"})
         soon = rospy.Time.now() + rospy.Duration(100.0)
         nan = float("nan")
         cases = [

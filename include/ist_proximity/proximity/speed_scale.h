@@ -3,11 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/stopping_reach.h"
 
 namespace ist {
 
@@ -21,16 +23,19 @@ struct LinkSpeedDistances {
   double free_distance = kAsRobot;  ///< [m]; NaN: the robot's
 };
 
-/// The protective separation distance of ISO/TS 15066:2016, 5.5.4, solved for the robot's speed.
-/// This library is not safety-rated; the formula is used, no conformity is claimed.
+/// The protective separation distance of ISO 10218-2:2025 (before: ISO/TS 15066:2016, 5.5.4),
+/// solved for the robot's speed. This library is not safety-rated; the formula is used, no
+/// conformity is claimed.
 struct SeparationConfig {
   bool enabled = false;  ///< false: the distances alone decide
-  /// [m/s] >= 0 K of ISO 13855: obstacles are taken to approach at least this fast. 1.6 is a
+  /// [m/s] >= 0 K of ISO 13855:2024: obstacles are taken to approach at least this fast. 1.6 is a
   /// walking person; ISO 13855 asks for 2.0 where hands are nearer than 0.5 m.
   double obstacle_speed = 1.6;
-  double robot_speed = 1.0;    ///< [m/s] > 0: the fastest point of the robot at scale 1
+  /// [m/s] > 0: the fastest point of the robot at scale 1, where SpeedScaleInput::reach is not
+  /// known.
+  double robot_speed = 1.0;
   double reaction_time = 0.1;  ///< [s] >= 0, of controller and drives, besides the data's age
-  double stopping_time = 0.3;  ///< [s] >= 0, in which the robot stops from robot_speed
+  double stopping_time = 0.3;  ///< [s] >= 0, in which the robot stops from robot_speed; likewise
   double intrusion = 0.0;      ///< [m] >= 0, C: reach of a part past the sensor before it is seen
   double uncertainty = 0.0;    ///< [m] >= 0, Z_d + Z_r, what ~query/margin does not hold yet
 };
@@ -82,6 +87,8 @@ struct SpeedScaleInput {
   double lower_bound = -std::numeric_limits<double>::infinity();  ///< [m] proven
   /// [m/s] ClosingRates::obstacles; NaN: not known
   double obstacle_speed = std::numeric_limits<double>::quiet_NaN();
+  /// What the link reaches until it stands, from the speed at scale 1; none: see SeparationConfig.
+  std::optional<StoppingReach> reach = std::nullopt;
 };
 
 /// A speed scale, and why.
@@ -106,12 +113,16 @@ struct SpeedScaleAnswer {
 /// `hysteresis`, so the bound used is never above the link's own. Noise that is smaller than the
 /// hysteresis changes nothing. Time does not matter.
 ///
-/// The scale, with SeparationConfig::enabled, is also limited to what ISO/TS 15066 allows. With
+/// The scale, with SeparationConfig::enabled, is also limited to what ISO 10218-2 allows. With
 /// T_r = reaction_time + age and T_s = stopping_time, the separation distance is
 ///   S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z,
 /// where v_h is obstacle_speed, or the obstacles' measured speed where that is larger, and the
 /// robot stops from v_r at constant deceleration. v_r is solved for S = bound, and the scale is
-/// v_r / robot_speed. The robot's measured speed is not used: it depends on the scale itself.
+/// v_r / robot_speed. Where a link's reach (speed v, distance b, time t at scale 1) is known, it
+/// takes the place of both constants: at the scale k the link goes k v T_r + k^2 b until it stands,
+/// in T_s = k t, and k is solved for
+///   bound = v_h (T_r + k t) + k v T_r + k^2 b + C + Z.
+/// The robot's measured speed is not used: it depends on the scale itself.
 ///
 /// One object per robot, one thread. update() allocates nothing.
 class SpeedScale {

@@ -40,6 +40,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       pose_source_(std::move(poses)),
       pose_timeout_(config.pose_timeout),
       self_counts_(config.self_collision.enabled && config.self_collision.in_minimum),
+      future_(config.deceleration, model_->kinematics, boxes_, model_->monitored),
       selection_(reader),
       worlds_(config),
       queries_(std::make_unique<CoherentQueries>(model_->robot, config.query)),
@@ -118,6 +119,7 @@ void ProximityCycle::report(const ProximityArray& message, CycleReport* report) 
 void ProximityCycle::set_problem(const ModelState& model) {
   status_input_.has_model = model.problem.empty();
   model_findings_ = model_findings(model);
+  note(Rank::kDegraded, "model", future_.problem(), &model_findings_);
 }
 
 void ProximityCycle::set_warm_up(SceneWarmUp* warm_up) {
@@ -300,6 +302,7 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
 
 void ProximityCycle::fill_links(ProximityArray* message) {
   const std::string nowhere;
+  if (future_.is_stated()) future_.update(pose_source_.get(), poses_.stamp);
   message->links.resize(model_->monitored.size());
   for (std::size_t k = 0; k < message->links.size(); ++k) {
     const std::size_t i = model_->monitored[k];
@@ -317,6 +320,7 @@ void ProximityCycle::fill_links(ProximityArray* message) {
                            unknown_space_->answer(i).direction, unknown_is_obstacle_,
                            &message->links[k]);
     }
+    message->links[k].robot_future = future_.left_of(k, message->links[k].lower_bound);
   }
 }
 

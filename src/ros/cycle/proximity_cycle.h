@@ -17,6 +17,7 @@
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/cycle/late_frames.h"
+#include "ros/cycle/robot_future.h"
 #include "ros/cycle/scene_warm_up.h"
 #include "ros/cycle/unknown_space_query.h"
 #include "ros/cycle/world_answers.h"
@@ -90,6 +91,10 @@ class ProximityCycle {
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
 
+  /// By monitored link: what it would reach until it stands, if all joints moved as fast as the
+  /// URDF allows. Empty where ~joint_deceleration is not stated.
+  Span<const StoppingReach> full_speed_reach() const { return future_.at_full_speed(); }
+
   /// The scene that is drawn beside the message of the last run(), in the fixed frame. The box
   /// encloses the inner spheres of all links whose pose was known; each sphere is looked at, which
   /// is for pictures and not for every cycle.
@@ -130,6 +135,7 @@ class ProximityCycle {
   std::unique_ptr<PoseSource> pose_source_;
   const double pose_timeout_;  ///< [s]
   const bool self_counts_;     ///< ~self_collision/in_minimum
+  RobotFuture future_;
   CloudSelection selection_;
   WorldAnswers worlds_;
   CarriedWorlds carried_;

@@ -69,6 +69,7 @@ void assign_link(const std::string& name, const LinkProximity& result,
   const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(kNaN);
   assign_unknown_space({}, kNaN, nowhere, false, message);
   assign_box({}, message);
+  message->robot_future = kNaN;
   message->source.assign(source, 0, result.state >= LinkState::kNear ? source.size() : 0);
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "internal/geometry/numbers.h"
 #include "ros/common/publish.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
@@ -16,6 +17,10 @@ namespace {
 
 using ist_proximity::ProximityArray;
 using ist_proximity::SpeedScaleState;
+
+constexpr char kUnknownReach[] =
+    "stop: how far a link goes until it stands is not known: the URDF has to limit the velocity of "
+    "each joint above it, and ~joint_deceleration to state how that brakes";
 
 std::string metres(double value) { return format_text("%.3f m", value); }
 
@@ -32,11 +37,13 @@ bool are_links_of(const ProximityArray& result, const CountedLinks& links) {
                     [](const auto& link, const std::string& name) { return link.link == name; });
 }
 
-std::vector<SpeedScaleInput> inputs_of(const ProximityArray& result) {
+std::vector<SpeedScaleInput> inputs_of(const ProximityArray& result,
+                                       Span<const StoppingReach> reach) {
   std::vector<SpeedScaleInput> inputs;
   for (const auto& link : result.links) {
     inputs.push_back(
         {static_cast<LinkState>(link.state), link.lower_bound, link.closing_speed_obstacles});
+    if (!reach.empty()) inputs.back().reach = reach[inputs.size() - 1];
   }
   return inputs;
 }
@@ -101,7 +108,8 @@ bool SpeedScalePublisher::is_fresh(const ProximityArray* self, const ros::Time& 
 }
 
 void SpeedScalePublisher::publish(const ProximityArray& result, const ProximityArray* self,
-                                  const SpeedScaleConfig& config, const ros::Time& now) {
+                                  const SpeedScaleConfig& config, const ros::Time& now,
+                                  Span<const StoppingReach> reach) {
   self_problem_.clear();
   if (self_counts_ && !is_fresh(self, now)) {
     self_problem_ = self ? "the newest ~self_proximity is too old, or of another model"
@@ -115,7 +123,7 @@ void SpeedScalePublisher::publish(const ProximityArray& result, const ProximityA
     min_distance_ = std::isnan(own) ? own : std::min(min_distance_, own);  // keeps NaN
   }
   if (is_enabled_) {
-    find_scale(result, is_known && self_counts_ ? self : nullptr, config, now);
+    find_scale(result, is_known && self_counts_ ? self : nullptr, config, now, reach);
     publish_number(answer_.scale, scale_publisher_);
     if (state_publisher_.getNumSubscribers() > 0) {
       SpeedScaleState state;
@@ -129,15 +137,18 @@ void SpeedScalePublisher::publish(const ProximityArray& result, const ProximityA
 
 /// @param self  null: it does not count
 void SpeedScalePublisher::find_scale(const ProximityArray& result, const ProximityArray* self,
-                                     const SpeedScaleConfig& config, const ros::Time& now) {
+                                     const SpeedScaleConfig& config, const ros::Time& now,
+                                     Span<const StoppingReach> reach) {
   answer_ = SpeedScaleAnswer();
   decisive_ = &result;
   if (!is_usable(result) || !self_problem_.empty()) return;
-  answer_ = scale_.update(config, inputs_of(result), links_.counts, oldest_age(result, now));
+  answer_ = scale_.update(config, inputs_of(result, reach), links_.counts, oldest_age(result, now));
+  const auto decisive = static_cast<std::size_t>(answer_.link);
+  is_reach_known_ = answer_.link < 0 || reach.empty() || reach[decisive].distance < kInfinity;
   if (!self || answer_.rule == SpeedRule::kUnknown) return;
   SpeedScale own_scale(self_links_.links);  // without hysteresis it remembers nothing
   const SpeedScaleAnswer own =
-      own_scale.update(between_links(config), inputs_of(*self), self_links_.counts, 0.0);
+      own_scale.update(between_links(config), inputs_of(*self, {}), self_links_.counts, 0.0);
   if (own.rule != SpeedRule::kUnknown && own.scale >= answer_.scale) return;
   answer_ = own;
   decisive_ = self;
@@ -162,6 +173,7 @@ void SpeedScalePublisher::fill_state(const ProximityArray& result, const SpeedSc
   state->stop_distance = answer_.stop_distance;
   state->free_distance = answer_.free_distance;
   state->text = speed_scale_text(answer_, *decisive_);
+  if (answer_.rule == SpeedRule::kSeparation && !is_reach_known_) state->text = kUnknownReach;
   if (!self_problem_.empty()) state->text = "stop: " + self_problem_;
   const std::vector<std::string> unknown = scale_.unknown_links(config);
   if (!unknown.empty() && !links_.links.empty()) {

@@ -32,9 +32,10 @@ class SpeedScalePublisher {
   /// @param result  of the cycle; with other links than set_links() has stated, nothing is known
   /// @param self    the newest ~self_proximity; null: none yet, or not enabled
   /// @param now     the ROS clock's time
+  /// @param reach   by link of `result`, see SpeedScaleInput; empty: not known
   void publish(const ist_proximity::ProximityArray& result,
                const ist_proximity::ProximityArray* self, const SpeedScaleConfig& config,
-               const ros::Time& now);
+               const ros::Time& now, Span<const StoppingReach> reach);
 
   // The result of the last publish(), for the diagnostics.
   double min_distance() const { return min_distance_; }  ///< [m] NaN: not known
@@ -48,7 +49,7 @@ class SpeedScalePublisher {
   bool is_fresh(const ist_proximity::ProximityArray* self, const ros::Time& now) const;
   void find_scale(const ist_proximity::ProximityArray& result,
                   const ist_proximity::ProximityArray* self, const SpeedScaleConfig& config,
-                  const ros::Time& now);
+                  const ros::Time& now, Span<const StoppingReach> reach);
   double oldest_age(const ist_proximity::ProximityArray& result, const ros::Time& now) const;
   void fill_state(const ist_proximity::ProximityArray& result, const SpeedScaleConfig& config,
                   ist_proximity::SpeedScaleState* state) const;
@@ -61,6 +62,7 @@ class SpeedScalePublisher {
   CountedLinks links_, self_links_;
   SpeedScale scale_;
   SpeedScaleAnswer answer_;
+  bool is_reach_known_ = true;  ///< of the link that decides
   /// The message that holds the link that decides; null: none does. Valid within publish().
   const ist_proximity::ProximityArray* decisive_ = nullptr;
   std::string self_problem_;  ///< why distances from link to link are not known; else empty

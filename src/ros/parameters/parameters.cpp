@@ -49,6 +49,14 @@ void find_links_with_distances(ParameterReader* reader, SpeedScaleConfig* config
   }
 }
 
+void read_decelerations(ParameterReader* reader, JointDeceleration* deceleration) {
+  for (const std::string& joint : reader->children("joint_deceleration")) {
+    if (joint == "default") continue;
+    reader->read({"joint_deceleration/" + joint, &deceleration->by_joint[joint],
+                  Range::non_negative("rad/s^2 or m/s^2", 1e3)});
+  }
+}
+
 /// Makes distances that are not set fit a max_distance below them, in proportion where neither is.
 void fit_speed_scale(const ParameterReader& reader, double max_distance, SpeedScaleConfig* config) {
   const SpeedScaleConfig fitted = fitted_to(*config, max_distance);
@@ -112,6 +120,15 @@ QueryConfig default_query() {
   return query;
 }
 
+std::vector<double> JointDeceleration::of(const Kinematics& kinematics) const {
+  std::vector<double> result;
+  for (const Kinematics::Joint& joint : kinematics.joints()) {
+    const auto own = by_joint.find(joint.name);
+    result.push_back(own == by_joint.end() ? other : own->second);
+  }
+  return result;
+}
+
 double deadline_of(double parameter, double period) {
   return parameter < 0.0 ? -parameter * period : parameter;
 }
@@ -122,6 +139,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   config.model.cache_directory = default_cache_directory();
   find_links_with_distances(&reader, &config.speed_scale);
   reader.read_all(node_parameters(&config));
+  read_decelerations(&reader, &config.deceleration);
   check_model(&reader, config);
   fit_speed_scale(reader, config.query.max_distance, &config.speed_scale);
   check_speed_scale(&reader, config);
@@ -136,9 +154,9 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
     source.ingest.search_distance = config.query.max_distance;
   }
   check_unknown_space(&reader, config);
-  if (!config.trajectory.cancel_topic.empty() && config.trajectory.deceleration == 0.0) {
+  if (!config.trajectory.cancel_topic.empty() && !config.deceleration.is_stated()) {
     reader.add_error("trajectory/cancel_topic",
-                     "needs ~trajectory/deceleration: nobody knows when braking is due without it");
+                     "needs ~joint_deceleration: nobody knows when braking is due without it");
   }
   if (config.self_collision.in_minimum && !config.self_collision.enabled) {
     warnings->push_back("~self_collision/in_minimum has no effect without ~self_collision/enabled");

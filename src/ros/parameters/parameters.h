@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 #include <xmlrpcpp/XmlRpc.h>
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -18,6 +19,7 @@
 #include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/parameters/source_config.h"
@@ -68,10 +70,19 @@ struct AttachConfig {
   double max_time = 30.0;  ///< [s] for one object, reading and packing it included; > 0
 };
 
+/// ~joint_deceleration: with how much [rad/s^2, m/s^2] joints brake at least; 0: not known.
+struct JointDeceleration {
+  double other = 0.0;                      ///< of joints that are not in by_joint
+  std::map<std::string, double> by_joint;  ///< by name
+
+  bool is_stated() const { return other > 0.0 || !by_joint.empty(); }
+  /// By joint of the kinematics.
+  std::vector<double> of(const Kinematics& kinematics) const;
+};
+
 /// Parameters of ~trajectory.
 struct TrajectoryConfig {
   double tolerance = 0.1;       ///< [rad, m] how far joints may be from the trajectory; > 0
-  double deceleration = 0.0;    ///< [rad/s^2, m/s^2] of each joint while braking; 0: not known
   double obstacle_speed = 0.0;  ///< [m/s] obstacles may come this fast; >= 0
   std::string cancel_topic;     ///< of an action; empty: nothing is cancelled
 };
@@ -101,6 +112,7 @@ struct ServerConfig : LiveConfig {
   ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   SelfCollisionConfig self_collision;
   AttachConfig attach;
+  JointDeceleration deceleration;
   TrajectoryConfig trajectory;
   /// Links that do not count in ~min_distance, ~speed_scale and the summary of the diagnostics.
   std::vector<std::string> ignore_links;

@@ -113,6 +113,7 @@ ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   listener_.read(which_, *kinematics_, &positions_);
   positions_.resize(joints.size());
   q_.assign(joints.size(), std::nan(""));
+  velocities_.assign(joints.size(), std::nan(""));
   joint_problems_.assign(joints.size(), PoseProblem());
   std::size_t newest = joints.size();
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -125,7 +126,10 @@ ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!has_own(j) || !joint_problems_[j].empty()) continue;
     joint_problems_[j] = {is_late(j, newest), true};
-    if (joint_problems_[j].empty()) q_[j] = positions_[j].q;
+    if (!joint_problems_[j].empty()) continue;
+    q_[j] = positions_[j].q;
+    // The last velocity is not that of a joint whose newer samples are refused.
+    if (!positions_[j].refusal) velocities_[j] = positions_[j].velocity;
   }
   return positions_[newest].stamp;
 }
@@ -193,6 +197,7 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   const ros::Time last = poses->stamp;
   ros::Time instant = now.isZero() ? ros::Time() : read_positions(now);
   if (!now.isZero() && last_.stamp == last && last_.count_known() > 0 && must_hold(instant)) {
+    velocities_.clear();
     *poses = last_;
     return;
   }
@@ -239,6 +244,7 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
 
 /// Takes all poses from tf, at the newest instant that it knows.
 void JointPoseSource::look_up_behind(const ros::Time& now, StampedLinkPoses* poses) {
+  velocities_.clear();  // those are of a later instant
   tf_source_.look_up(now, poses);
   for (std::size_t i = 0; i < moved_by_.size(); ++i) {
     for (const std::size_t j : moved_by_[i]) {

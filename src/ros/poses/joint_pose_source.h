@@ -43,6 +43,7 @@ class JointPoseSource : public PoseSource {
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
                    BodyPoses* bodies) override;
+  Span<const double> joint_velocities() const override { return velocities_; }
   std::string hint() const override;
 
  private:
@@ -71,6 +72,7 @@ class JointPoseSource : public PoseSource {
   // Valid for one look_up().
   JointPositions positions_;
   std::vector<double> q_;                    ///< by joint; NaN where it is not known
+  std::vector<double> velocities_;           ///< likewise, or empty
   std::vector<PoseProblem> joint_problems_;  ///< by joint
   JointPoses joints_;
   bool tf_is_behind_ = false;

@@ -173,6 +173,8 @@ void JointStateListener::collect(const sensor_msgs::JointState& message, bool co
   std::size_t unknowns = 0;
   for (std::size_t i = 0; i < std::min(message.name.size(), kMaxNames); ++i) {
     const double q = i < message.position.size() ? message.position[i] : std::nan("");
+    const bool has_velocity = message.velocity.size() == message.name.size();
+    const double velocity = has_velocity ? message.velocity[i] : std::nan("");
     const auto found = index_.find(message.name[i]);
     if (found == index_.end()) {
       if (unknowns++ == 0) unknown = &message.name[i];
@@ -188,7 +190,7 @@ void JointStateListener::collect(const sensor_msgs::JointState& message, bool co
     }
     if (place_[j] == kNowhere) {
       place_[j] = stated_.size();
-      stated_.push_back({j, q, ""});
+      stated_.push_back({j, q, velocity, ""});
       const std::string fault = why_not_a_position(joint, q);
       if (!fault.empty()) {
         stated_.back().fault =
@@ -287,6 +289,7 @@ void JointStateListener::use(const Stated& stated, const ros::Time& stamp,
     position.spacing = std::max(interval, 0.9 * position.spacing + 0.1 * interval);
   }
   position.q = stated.q;
+  position.velocity = stated.velocity;
   position.stamp = std::max(position.stamp, stamp);
   position.refusal.reset();
   position.is_missing = false;

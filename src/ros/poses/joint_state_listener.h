@@ -25,6 +25,7 @@ namespace ist {
 struct JointPosition {
   /// [rad, m]; NaN and stamp 0 until a message states it.
   double q = std::numeric_limits<double>::quiet_NaN();
+  double velocity = std::numeric_limits<double>::quiet_NaN();  ///< [rad/s, m/s] NaN: not stated
   /// The stamp of the message; the receipt where that is ahead of the clock. Never goes back.
   ros::Time stamp;
   ros::Time sent;        ///< the message's stamp
@@ -106,7 +107,7 @@ class JointStateListener {
   /// A position that a message states.
   struct Stated {
     std::size_t joint;
-    double q;
+    double q, velocity;
     std::string fault;  ///< why it cannot be used; empty: it can
   };
 

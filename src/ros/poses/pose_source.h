@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/geometry/span.h"
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/link_poses.h"
 
@@ -52,6 +53,10 @@ class PoseSource {
   /// @param instant  the stamp that look_up() gave
   virtual void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
                            BodyPoses* bodies) = 0;
+
+  /// How fast the joints moved at the instant of the last look_up() [rad/s, m/s], by joint of the
+  /// kinematics: NaN where that is not known. Empty: of none it is.
+  virtual Span<const double> joint_velocities() const { return {}; }
 
   /// Whether the poses are of a configuration that the robot need not be in.
   virtual bool is_stated() const { return false; }

@@ -248,9 +248,9 @@ void TrajectoryWatch::fill_contact(std::size_t link, double contact, double now,
   message->time_to_contact = (message->contact - message->header.stamp).toSec();
   message->text = format_text("link '%s' may touch an obstacle in %.2f s",
                               model_->links[link].c_str(), message->time_to_contact);
-  const double deceleration = config_.trajectory.deceleration;
-  if (deceleration > 0.0) {
-    const double brake = trajectory_.latest_brake(now, contact, deceleration);
+  if (config_.deceleration.is_stated()) {
+    const double brake =
+        trajectory_.latest_brake(now, contact, config_.deceleration.of(*model_->kinematics));
     message->brake = after(trajectory_.start, brake);
     message->text +=
         format_text("; braking is due in %.2f s", (message->brake - message->header.stamp).toSec());

@@ -111,7 +111,8 @@ sensor_msgs::JointState WatchedTrajectory::state(const Kinematics& kinematics, d
   return message;
 }
 
-double WatchedTrajectory::latest_brake(double from, double contact, double deceleration) const {
+double WatchedTrajectory::latest_brake(double from, double contact,
+                                       const std::vector<double>& decelerations) const {
   double rate = kInfinity;  // [1/s] at which time can be slowed down
   for (std::size_t k = 0; k + 1 < pieces.times.size(); ++k) {
     if (pieces.times[k + 1] <= from || pieces.times[k] >= contact) continue;
@@ -121,7 +122,7 @@ double WatchedTrajectory::latest_brake(double from, double contact, double decel
       const double acceleration = 8.0 * pieces.deviations[k][joint] / (span * span);
       const double change = std::abs(pieces.positions[k + 1][joint] - pieces.positions[k][joint]);
       const double speed = change / span + 0.5 * acceleration * span;
-      if (speed > 0.0) rate = std::min(rate, (deceleration - acceleration) / speed);
+      if (speed > 0.0) rate = std::min(rate, (decelerations[joint] - acceleration) / speed);
     }
   }
   if (!(rate > 0.0)) return from;

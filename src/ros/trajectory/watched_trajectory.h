@@ -28,9 +28,10 @@ struct WatchedTrajectory {
   /// The same, of the joints that it moves, as a message.
   sensor_msgs::JointState state(const Kinematics& kinematics, double time) const;
   /// [s] The latest time at which braking along the trajectory still ends before `contact`; `from`
-  /// where that is past. Braking slows time down steadily, as fast as every joint can with
-  /// `deceleration` [rad/s^2, m/s^2] beside what the trajectory asks of it.
-  double latest_brake(double from, double contact, double deceleration) const;
+  /// where that is past. Braking slows time down steadily, as fast as every joint can with its
+  /// deceleration [rad/s^2, m/s^2] beside what the trajectory asks of it.
+  /// @param decelerations  by joint of the kinematics
+  double latest_brake(double from, double contact, const std::vector<double>& decelerations) const;
 };
 
 /// Reads a message with one point or more. Where its first point is not at time 0, the trajectory
