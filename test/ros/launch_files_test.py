@@ -7,8 +7,11 @@ import subprocess
 import sys
 import unittest
 from xml.etree import ElementTree
+from xmlrpc.client import ServerProxy
 
+import numpy as np
 import proximity_testing as pt
+import rosgraph
 import roslaunch.config
 import roslaunch.xmlloader
 import rospy
@@ -124,6 +127,32 @@ class LaunchFilesTest(unittest.TestCase):
         q = {"turn": 0.5, "slide": 0.2}
         robot = Robot("/managed", q, {"camera/points": beside_the_ball(q, 0.1)})
         self.check(robot, 0.1, "cloud")
+        robot.stop()
+
+    def check_not_copied(self, topic):
+        """The manager hands the topic's messages to itself, by pointer."""
+        (manager,) = {node for name, nodes in rosgraph.Master("/launch_files").getSystemState()[0]
+                      if name == topic for node in nodes}
+        uri = rosgraph.Master("/launch_files").lookupNode(manager)
+        _, _, connections = ServerProxy(uri).getBusInfo("/launch_files")
+        self.assertEqual({one[3] for one in connections if one[4] == topic}, {"INTRAPROCESS"})
+
+    def test_filters_of_pcl(self):
+        """What a nodelet of pcl_ros drops, here below z = 0.68, is no obstacle; points that it joins are
+        one, in their middle."""
+        q = {"turn": 0.5, "slide": 0.2}
+        kept, dropped = beside_the_ball(q, 0.1), beside_the_ball(q, 0.05)
+        self.assertLess(dropped[0, 2], 0.68)
+        robot = Robot("/filtered", q, {"camera/points": np.vstack([kept, dropped])})
+        self.check(robot, 0.1, "cloud")
+        self.check_not_copied("/filtered/camera/points_filtered")
+        robot.stop()
+
+        ends = np.vstack([beside_the_ball(q, 0.06), beside_the_ball(q, 0.14)])
+        self.assertEqual(len(set(map(tuple, np.floor(ends / 0.5)))), 1)  # one voxel
+        robot = Robot("/thinned", q, {"camera/points": ends})
+        self.check(robot, 0.1, "cloud")
+        self.check_not_copied("/thinned/camera/points_filtered")
         robot.stop()
 
     def test_cell(self):
