@@ -182,12 +182,31 @@ std::string read_vertices(const Element& element, NumberReader* in, PointFile* f
   return "";
 }
 
+/// Whether a camera is elsewhere than at the origin, or turned, by the names that PCL and MeshLab
+/// give its pose.
+bool is_moved_camera(const Element& element, const std::vector<double>& values) {
+  static const std::map<std::string, double> kAtOrigin = {
+      {"view_px", 0.0}, {"view_py", 0.0}, {"view_pz", 0.0}, {"x_axisx", 1.0},
+      {"x_axisy", 0.0}, {"x_axisz", 0.0}, {"y_axisx", 0.0}, {"y_axisy", 1.0},
+      {"y_axisz", 0.0}, {"z_axisx", 0.0}, {"z_axisy", 0.0}, {"z_axisz", 1.0}};
+  if (element.name != "camera") return false;
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const auto place = kAtOrigin.find(element.properties[i].name);
+    if (place != kAtOrigin.end() && values[i] != place->second) return true;
+  }
+  return false;
+}
+
 std::string skip(const Element& element, NumberReader* in) {
   if (element.properties.empty()) return "";
   std::vector<double> values(element.properties.size());
   for (std::size_t i = 0; i < element.count; ++i) {
     if (!read_instance(element, in, &values)) {
       return "is cut off or damaged in its element '" + printable(element.name) + "'";
+    }
+    if (is_moved_camera(element, values)) {
+      return "has a camera that is not at the origin: PCL writes points in its frame, others do "
+             "not. Write a PCD file, which states the frame, or a PLY file without a camera";
     }
   }
   return "";

@@ -134,6 +134,7 @@ py::array to_array(const py::object& points, Eigen::Isometry3d* X_QS) {
         "or a path");
   }
   const py::ssize_t dimensions = given.ndim();
+  if (dimensions == 1 && given.size() == 0) return DoubleArray(Shape{0, 3});  // an empty list
   if (dimensions < 2 || dimensions > 3 || given.shape(dimensions - 1) != 3) {
     throw py::value_error("points have the shape (n, 3) or (h, w, 3); an array of shape " +
                           to_string(given) + " was given");

@@ -32,7 +32,7 @@ max_error: [m] largest gap between a link's surface and its inner spheres; it ch
 max_spheres: most spheres of a link.
 links: names of the links to monitor; none: every link that has geometry.
 cache_directory: where packings are kept; empty: nowhere.
-package_dirs: folders that are packages, or hold them, by the names of their folders.
+package_dirs: a folder or several that are packages, or hold them, by the names of their folders.
 allow_unknown_links: whether links that cannot be used are UNKNOWN (unknown_links says why); else
   they raise ModelError. Answers for the whole robot have a lower bound of -inf then.
 progress: called with the share that is packed, from 0 to 1. An exception in it ends the packing.
@@ -65,7 +65,7 @@ using TextCallback = std::function<void(const std::string&)>;
 /// Reads and packs on a thread of its own. This thread calls Python: progress, and Ctrl-C.
 Robot make_robot(const py::object& urdf, const std::string& geometry, double max_error,
                  int max_spheres, const std::vector<std::string>& links,
-                 const py::object& cache_directory, const std::vector<py::object>& package_dirs,
+                 const py::object& cache_directory, const py::object& package_dirs,
                  bool allow_unknown_links, const DoneCallback& progress,
                  const TextCallback& warning) {
   RobotConfig config;
@@ -77,7 +77,10 @@ Robot make_robot(const py::object& urdf, const std::string& geometry, double max
   config.packing.max_spheres = max_spheres;
   config.links = links;
   config.cache_directory = to_path(cache_directory);
-  for (const py::object& folder : package_dirs) config.package_dirs.push_back(to_path(folder));
+  const py::object folders = is_path(package_dirs) ? py::make_tuple(package_dirs) : package_dirs;
+  for (const py::handle& folder : folders) {
+    config.package_dirs.push_back(to_path(py::reinterpret_borrow<py::object>(folder)));
+  }
   config.allow_unknown_links = allow_unknown_links;
   const std::string path_or_text = to_path(urdf);
 

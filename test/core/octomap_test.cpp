@@ -106,10 +106,12 @@ TEST(Octomap, WhatCannotBeUsedIsSaid) {
   EXPECT_EQ(distance(to_obstacles(empty)), std::numeric_limits<double>::infinity());
   const auto tree = random_tree<octomap::OcTree>(0.05, 400);
   OctomapSelection selection;
-  selection.limits.max_leaves = 100;
+  selection.limits.max_leaves = occupied_boxes(tree).size();
+  EXPECT_EQ(occupied_boxes(tree, selection).size(), selection.limits.max_leaves);
+  --selection.limits.max_leaves;
   test::expect_says(
       test::argument_error([&] { to_obstacles(tree, Eigen::Isometry3d::Identity(), selection); }),
-      "100 (max_leaves)");
+      std::to_string(selection.limits.max_leaves) + " (max_leaves)");
   selection = {};
   selection.limits.max_position = 0.5;
   test::expect_says(test::argument_error([&] { occupied_boxes(tree, selection); }),

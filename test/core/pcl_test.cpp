@@ -6,6 +6,7 @@
 #include <pcl/io/pcd_io.h>
 #include <pcl/io/ply_io.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -102,6 +103,11 @@ TEST(Pcl, EveryKindOfCloudGivesTheSameDistances) {
   pcl::toPCLPointCloud2(cloud, blob);
   EXPECT_EQ(distances(to_obstacles(blob)), expected);
   EXPECT_EQ(distances(to_obstacles(std::make_shared<pcl::PCLPointCloud2>(blob))), expected);
+  blob.is_bigendian = 1;
+  for (std::size_t i = 0; i < blob.data.size(); i += 4) {
+    std::reverse(&blob.data[i], &blob.data[i] + 4);
+  }
+  EXPECT_EQ(distances(to_obstacles(blob)), expected);
   const Obstacles obstacles = to_obstacles(cloud);
   EXPECT_EQ(obstacles.counts().received, cloud.size());
   EXPECT_EQ(obstacles.counts().not_a_number, 71U);
@@ -130,9 +136,13 @@ TEST(Pcl, FilesThatPclWritesGiveTheSameDistances) {
   const std::vector<double> unmoved = distances(to_obstacles(random_cloud()));
   const std::string ply = folder.file("cloud.ply");
   pcl::PLYWriter writer;
-  constexpr bool kWithCamera = false;
-  ASSERT_EQ(writer.write(ply, random_cloud(), true, kWithCamera), 0);
-  EXPECT_EQ(distances(Obstacles::from_file(ply)), unmoved);
+  for (const bool with_camera : {false, true}) {
+    ASSERT_EQ(writer.write(ply, random_cloud(), true, with_camera), 0);
+    EXPECT_EQ(distances(Obstacles::from_file(ply)), unmoved);
+  }
+  // PCL states the sensor's pose as a camera, and forgets it when it reads the file.
+  ASSERT_EQ(writer.write(ply, cloud), 0);
+  test::expect_says(test::error_of([&] { Obstacles::from_file(ply); }), "not at the origin");
 }
 
 // The sensor is 0.2 m behind the origin of the frame in which its pose is stated: a wall 0.5 m
@@ -147,6 +157,10 @@ TEST(Pcl, PointsArePlacedByTheSensorsPose) {
   wall.sensor_origin_.x() = -0.2F;
   const PclView seen = view(wall);
   EXPECT_FLOAT_EQ(static_cast<float>(seen.X_QS.translation().x()), -0.2F);
+  pcl::PCLPointCloud2 blob;
+  pcl::toPCLPointCloud2(wall, blob);
+  const PclView same = view(blob, wall.sensor_origin_, wall.sensor_orientation_);
+  EXPECT_EQ(same.X_QS.matrix(), seen.X_QS.matrix());
   const Robot ball(
       "<robot name='r'><link name='ball'><collision><geometry><sphere radius='0.001'/>"
       "</geometry></collision></link></robot>");
@@ -170,6 +184,9 @@ TEST(Pcl, AViewCopiesAndAllocatesNothing) {
   pcl::PCLPointCloud2 blob;
   pcl::toPCLPointCloud2(cloud, blob);
   EXPECT_EQ(view(blob).points.data, blob.data.data());
+  const auto shared = cloud.makeShared();
+  const PclView kept = view(shared);
+  EXPECT_EQ(shared.use_count(), 2);
   IngestConfig config;
   config.self_filter = false;
   Ingest ingest(config);
@@ -188,6 +205,9 @@ TEST(Pcl, ACloudThatContradictsItselfIsRefused) {
   pcl::PointCloud<pcl::PointXYZ> cloud(3, 2);
   cloud.points.pop_back();
   test::expect_says(test::argument_error([&] { view(cloud); }), "5 points has width 3 * height 2");
+  cloud.width = cloud.height = 65537;
+  cloud.points.resize(131073);  // the product, but for 2^32
+  test::expect_says(test::argument_error([&] { view(cloud); }), "width 65537");
   cloud = pcl::PointCloud<pcl::PointXYZ>(3, 2);
   cloud.sensor_orientation_ = Eigen::Quaternionf(0, 0, 0, 0);
   test::expect_says(test::argument_error([&] { view(cloud); }), "sensor_orientation_");

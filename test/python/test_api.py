@@ -123,7 +123,7 @@ def test_meshes_are_found_from_the_file(tmp_path):
     urdf = tmp_path / 'arm_description' / 'urdf' / 'arm.urdf'
     urdf.write_text(mesh_urdf('beside.stl', '../meshes/above.stl', 'package://arm_description/meshes/package.stl'))
     obstacles = ist.Obstacles(np.array([[0.3, 0.0, 0.0]]))
-    for folders in ([tmp_path], [str(tmp_path)], [tmp_path / 'arm_description']):
+    for folders in ([tmp_path], str(tmp_path), tmp_path / 'arm_description', (folder for folder in ['/', tmp_path])):
         robot = ist.Robot(urdf, package_dirs=folders)
         assert not robot.unknown_links
         assert np.allclose(robot.distances({}, obstacles, tolerance=0.0).distance, 0.3)
@@ -290,7 +290,7 @@ def test_points_of_other_libraries(robot):
         assert np.array_equal(robot.distances(q, obstacles, tolerance=0.0).distance, expected)
         again = pickle.loads(pickle.dumps(obstacles))
         assert np.array_equal(robot.distances(q, again, tolerance=0.0).distance, expected)
-    assert len(ist.Obstacles(cloud_message(np.zeros((0, 0, 3), 'f4')))) == 0
+    assert len(ist.Obstacles(cloud_message(np.zeros((0, 0, 3), 'f4')))) == len(ist.Obstacles([])) == 0
     for wrong, message in [({'data': b''}, 'data holds'), ({'fields': []}, "'x'"), ({'row_step': 3}, 'row_step')]:
         with pytest.raises(ValueError, match=message):
             ist.Obstacles(cloud_message(image, **wrong))

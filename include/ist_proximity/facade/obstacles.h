@@ -100,8 +100,9 @@ struct PointFile {
 /// "vertex" (ascii, binary of either byte order); other fields are ignored. Thread safe.
 /// @throws ModelError naming the file, the place and what is wrong: not a regular file, over 1 GB,
 ///         cut off or longer than it says, no x, y and z, whole numbers for them (their unit is not
-///         known), a VIEWPOINT that is no pose, an unknown line, more than five million points, or
-///         faces or edges, whose corners alone would leave the surface out
+///         known), a VIEWPOINT that is no pose, an unknown line, more than five million points,
+///         faces or edges, whose corners alone would leave the surface out, or a PLY file's camera
+///         elsewhere than at the origin: whether points are stated in its frame is not known
 PointFile read_points(const std::string& path);
 
 }  // namespace ist
