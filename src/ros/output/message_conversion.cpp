@@ -43,6 +43,20 @@ void assign_box(const Eigen::AlignedBox3d& box_L, LinkMessage* message) {
   assign(box_L.isEmpty() ? nowhere : Eigen::Vector3d(box_L.sizes()), &message->box_size);
 }
 
+ist_proximity::LinkPairProximity pair_message(const RobotModel& robot, const LinkPair& pair,
+                                              const PairProximity& result) {
+  ist_proximity::LinkPairProximity message;
+  message.first = robot.links[pair.first].name;
+  message.second = robot.links[pair.second].name;
+  message.state = static_cast<std::uint8_t>(result.state);
+  message.distance = result.distance;
+  message.lower_bound = result.lower_bound;
+  assign(result.p_FCa, &message.point_on_first);
+  assign(result.p_FCb, &message.point_on_second);
+  assign(result.direction, &message.direction);
+  return message;
+}
+
 LinkMessage unknown_link(const std::string& name) {
   LinkMessage message;
   assign_link(name, {}, RepulsiveWrench::unknown(), Wrench::unknown(), {}, "", &message);

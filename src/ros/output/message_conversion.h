@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ist_proximity/LinkPairProximity.h>
 #include <ist_proximity/LinkProximity.h>
 #include <ist_proximity/ProximityArray.h>
 #include <ist_proximity/SourceStatus.h>
@@ -12,6 +13,7 @@
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/input/source_report.h"
 #include "ros/status/status.h"
@@ -29,6 +31,10 @@ void assign_link(const std::string& name, const LinkProximity& result,
                  const RepulsiveWrench& repulsion, const Wrench& penetration,
                  const ClosingRates& closing, const std::string& source,
                  ist_proximity::LinkProximity* message);
+
+/// Makes the message of a pair of links.
+ist_proximity::LinkPairProximity pair_message(const RobotModel& robot, const LinkPair& pair,
+                                              const PairProximity& result);
 
 /// Adds the box of the link's geometry.
 /// @param box_L  [m] in the link's frame; empty: not known

@@ -107,6 +107,7 @@ void SelfProximity::take_model() {
   pose_source_ =
       make_pose_source(*model_, config_, buffer_, joints_, JointStateListener::Which::kNewest);
   speeds_.assign(model_->robot->links.size(), ClosingSpeed());
+  boxes_ = link_boxes(*model_->robot);
 }
 
 std::vector<LinkPair> SelfProximity::watched_pairs() const {
@@ -227,6 +228,9 @@ void SelfProximity::publish_once() {
     note(Rank::kPose, "pose", missing_poses(robot, model_->monitored, poses_, pose_source_.get()),
          &input.findings);
     for (const std::size_t i : model_->monitored) add_link(i, live.repulsion, message.get());
+    for (std::size_t i = 0; i < results_.size(); ++i) {
+      message->pairs.push_back(pair_message(robot, query_->pairs()[i], results_[i]));
+    }
     const std::chrono::duration<double> took = Clock::now() - begin;
     message->computation_time = took.count();
   } else {
@@ -254,6 +258,7 @@ void SelfProximity::add_link(std::size_t link, const RepulsionConfig& repulsion,
   message->links.emplace_back();
   assign_link(robot.links[link].name, answer, push, penetration(link, answer), closing,
               robot.links[other].name, &message->links.back());
+  assign_box(boxes_[link].box_L, &message->links.back());
 }
 
 }  // namespace ist

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "ist_proximity/control/constraint_rows.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ros/common/stop_signal.h"
@@ -74,6 +75,7 @@ class SelfProximity {
   std::unique_ptr<SelfQuery> query_;  ///< null without a model or its kinematics
   std::unique_ptr<PoseSource> pose_source_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
+  std::vector<LinkBox> boxes_;        ///< likewise
   ros::Time last_now_, last_stamp_;
   StampedLinkPoses poses_;
   std::vector<PairProximity> results_;

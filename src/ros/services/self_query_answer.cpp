@@ -4,27 +4,10 @@
 #include <cmath>
 
 #include "internal/geometry/numbers.h"
-#include "ros/common/eigen_conversion.h"
+#include "ros/output/message_conversion.h"
 #include "ros/services/pair_choice.h"
 
 namespace ist {
-namespace {
-
-ist_proximity::LinkPairProximity to_message(const RobotModel& robot, const LinkPair& pair,
-                                            const PairProximity& result) {
-  ist_proximity::LinkPairProximity message;
-  message.first = robot.links[pair.first].name;
-  message.second = robot.links[pair.second].name;
-  message.state = static_cast<std::uint8_t>(result.state);
-  message.distance = result.distance;
-  message.lower_bound = result.lower_bound;
-  assign(result.p_FCa, &message.point_on_first);
-  assign(result.p_FCb, &message.point_on_second);
-  assign(result.direction, &message.direction);
-  return message;
-}
-
-}  // namespace
 
 void SelfQueryAnswer::set_model(const std::shared_ptr<const ModelState>& model) {
   if (model == model_) return;
@@ -67,7 +50,7 @@ void SelfQueryAnswer::add(const StatedPoseSource& poses, const QueryConfig& quer
   }
   query_->run(links.X_FL, known, &results_);
   for (const std::size_t i : pairs_) {
-    answers->push_back(to_message(*model_->robot, query_->pairs()[i], results_[i]));
+    answers->push_back(pair_message(*model_->robot, query_->pairs()[i], results_[i]));
   }
 }
 
