@@ -10,6 +10,7 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
+from geometry_msgs.msg import TwistStamped, Vector3
 from ist_proximity.msg import FilterState
 from proximity_testing import ProximityArray
 from sensor_msgs.msg import JointState
@@ -46,7 +47,7 @@ class Filter:
         self.states, self.given, self.scales = [], [], []
         for name, value in parameters.items():
             rospy.set_param(self.name + "/" + name, value)
-        kinds = {"std_msgs/Float64MultiArray": Float64MultiArray, "sensor_msgs/JointState": JointState}
+        kinds = {kind._type: kind for kind in (Float64MultiArray, JointState, TwistStamped)}
         self.kind = kinds.get(parameters.get("command_type"), JointTrajectory)
         self._subscribers = [
             rospy.Subscriber(self.name + "/filter_state", FilterState, self.states.append),
@@ -114,6 +115,8 @@ class VelocityFilterTest(unittest.TestCase):
     def given_velocity(self, message):
         if isinstance(message, JointTrajectory):
             return np.array(message.points[0].velocities)
+        if isinstance(message, TwistStamped):  # of a ball on two slides
+            return np.array([message.twist.linear.x, message.twist.linear.y])
         return np.array(message.data if isinstance(message, Float64MultiArray) else message.velocity)
 
     def command(self, *velocity):
@@ -123,6 +126,10 @@ class VelocityFilterTest(unittest.TestCase):
             message = JointTrajectory(joint_names=JOINTS, points=[point])
         elif self.filter.kind is JointState:
             message = JointState(name=JOINTS, velocity=velocity)
+        elif self.filter.kind is TwistStamped:
+            message = TwistStamped()
+            message.header.frame_id, message.header.stamp = "ball", rospy.Time.now()
+            message.twist.linear = Vector3(*velocity, *[0.0] * (3 - len(velocity)))
         else:
             message = Float64MultiArray(data=velocity)
         self.filter.publisher.publish(message)
@@ -182,6 +189,28 @@ class VelocityFilterTest(unittest.TestCase):
         # Positions follow the given velocity.
         given = self.filter.given[-1].points[0]
         self.assertLess(abs(given.positions[1] - self.q[1]), 0.2)
+
+    def test_twist_of_the_ball(self):
+        self.start(0.5, 0.1, command_type="geometry_msgs/TwistStamped")
+        limited = self.wait_for(FilterState.LIMITED)
+        self.assertEqual(list(limited.joints), JOINTS)
+        self.assertEqual(limited.links, ["ball"])
+        np.testing.assert_allclose(limited.command, [0.5, 0.1], atol=1e-9)
+        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
+        self.assertGreaterEqual(self.nearest, STOP - 0.005)
+        self.assertGreater(self.velocity[1], 0.05)
+        self.assertEqual(self.filter.given[-1].header.frame_id, "ball")
+        self.wanted = (-0.3, 0.0)
+        self.wait_for(FilterState.FREE)
+        # A joint that is too slow slows the ball down and does not turn its way.
+        self.wanted = (-0.2, 0.8)
+        state = self.wait_for(FilterState.SCALED, "across")
+        np.testing.assert_allclose(state.velocity, [-0.1, 0.4], atol=1e-6)
+        self.wanted = (0.0, 0.0, 0.1)
+        self.check_fault("'ball' cannot move so where it is")
+        self.wanted = (np.nan, 0.0)
+        self.check_fault("not a finite number")
+        pt.wait_until(lambda: not np.any(self.velocity), "the ball to stand")
 
     def test_started_inside_the_stop_distance(self):
         self.q = np.array([WALL - RADIUS - 0.02, 0.0])

@@ -20,6 +20,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using ist_proximity::FilterState;
 
+// [rad/s, m/s] What rounding makes of a velocity.
+constexpr double kNegligible = 1e-8;
 // [s] Over which the speed of joints that are not commanded is measured.
 constexpr double kSpeedWindow = 0.05;
 
@@ -37,7 +39,8 @@ void set_stamp(const ros::Time& now, trajectory_msgs::JointTrajectory* message) 
   // A stamp of 0 means "now" to those who follow a trajectory.
   if (!message->header.stamp.isZero()) message->header.stamp = now;
 }
-void set_stamp(const ros::Time& now, sensor_msgs::JointState* message) {
+template <class Message>
+void set_stamp(const ros::Time& now, Message* message) {
   message->header.stamp = now;
 }
 void set_stamp(const ros::Time&, std_msgs::Float64MultiArray*) {}
@@ -68,6 +71,8 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
     subscribe<std_msgs::Float64MultiArray>();
   } else if (config_.command_type == "sensor_msgs/JointState") {
     subscribe<sensor_msgs::JointState>();
+  } else if (config_.command_type == "geometry_msgs/TwistStamped") {
+    subscribe<geometry_msgs::TwistStamped>();
   } else {
     subscribe<trajectory_msgs::JointTrajectory>();
   }
@@ -97,7 +102,9 @@ void CommandFilter::receive(const Message& message) {
   const auto begin = Clock::now();
   clock_has_gone_back();
   const auto q = [this](const std::string& joint) { return position_of(joint); };
-  const JointCommand command = read_command(message, config_.joints, q);
+  const JointCommand command =
+      read_command(message, {config_.joints, q, kinematics_, config_.tool, ros::Time::now(),
+                             config_.command_timeout});
   const auto give = [this, q, message, command](const std::vector<double>& velocity,
                                                 FilterState* state, double time) {
     Message given = message;
@@ -277,7 +284,31 @@ std::vector<double> CommandFilter::filter(const JointCommand& command, FilterSta
     velocity[i] = answer.velocity[*column_of(command.joints[i])];
   }
   explain(answer, state);
+  if (command.jacobian.size() == 0 || state->status != FilterState::LIMITED ||
+      (state->limited_joints.empty() && is_twist_proven(command, velocity))) {
+    return velocity;
+  }
+  state->status = given_scale_ > 0.0 ? FilterState::SCALED : FilterState::STOPPED;
+  for (std::size_t i = 0; i < velocity.size(); ++i) {
+    velocity[i] = given_scale_ * command.velocity[i];
+  }
   return velocity;
+}
+
+/// Who receives a twist makes it with joint velocities of his own: with the least ones, it is
+/// supposed. Those have to pass as they are.
+bool CommandFilter::is_twist_proven(const JointCommand& command,
+                                    const std::vector<double>& velocity) {
+  const Eigen::Map<const Eigen::VectorXd> given(velocity.data(), command.jacobian.cols());
+  const Eigen::VectorXd least = least_velocity(command.jacobian, command.jacobian * given);
+  for (std::size_t i = 0; i < velocity.size(); ++i) {
+    command_column_[*column_of(command.joints[i])] = least[static_cast<Eigen::Index>(i)];
+  }
+  const FilterAnswer& answer = filter_->run(command_column_, q_column_, rows_, config_.time_limit);
+  for (std::size_t c = 0; c < command_column_.size(); ++c) {
+    if (!(std::abs(answer.velocity[c] - command_column_[c]) <= kNegligible)) return false;
+  }
+  return true;
 }
 
 const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::Time& now) {

@@ -49,6 +49,7 @@ class CommandFilter {
   std::vector<double> filter(const JointCommand& command, ist_proximity::FilterState* state);
   std::string why_not(const JointCommand& command, const ros::Time& now) const;
   const FilterAnswer& run(const JointCommand& command, const ros::Time& now);
+  bool is_twist_proven(const JointCommand& command, const std::vector<double>& velocity);
   void hold_others(const std::vector<bool>& is_commanded, const ros::Time& now);
   void explain(const FilterAnswer& answer, ist_proximity::FilterState* state) const;
   std::optional<std::size_t> column_of(const std::string& joint) const;

@@ -41,7 +41,7 @@ void take(const std::vector<double>& velocity, JointCommand* command) {
 }
 
 JointCommand command_of(const std::vector<std::string>& joints) {
-  return {joints, std::vector<double>(joints.size(), kNaN), ""};
+  return {joints, std::vector<double>(joints.size(), kNaN), "", {}};
 }
 
 // The positions that velocities lead to within a time [s]; none where one is not known.
@@ -58,7 +58,7 @@ std::vector<double> positions_after(double time, const JointCommand& command,
 }  // namespace
 
 JointCommand read_command(const trajectory_msgs::JointTrajectory& message,
-                          const std::vector<std::string>&, const JointPositionOf& q) {
+                          const CommandReader& reader) {
   JointCommand command = command_of(message.joint_names);
   if (message.points.size() != 1) {
     command.fault =
@@ -81,23 +81,21 @@ JointCommand read_command(const trajectory_msgs::JointTrajectory& message,
         time);
   } else {
     for (std::size_t i = 0; i < command.joints.size(); ++i) {
-      command.velocity[i] = (point.positions[i] - q(command.joints[i])) / time;
+      command.velocity[i] = (point.positions[i] - reader.q(command.joints[i])) / time;
     }
   }
   check(&command);
   return command;
 }
 
-JointCommand read_command(const sensor_msgs::JointState& message, const std::vector<std::string>&,
-                          const JointPositionOf&) {
+JointCommand read_command(const sensor_msgs::JointState& message, const CommandReader&) {
   JointCommand command = command_of(message.name);
   take(message.velocity, &command);
   return command;
 }
 
-JointCommand read_command(const std_msgs::Float64MultiArray& message,
-                          const std::vector<std::string>& names, const JointPositionOf&) {
-  JointCommand command = command_of(names);
+JointCommand read_command(const std_msgs::Float64MultiArray& message, const CommandReader& reader) {
+  JointCommand command = command_of(reader.joints);
   const std::size_t offset = message.layout.data_offset;
   if (offset > message.data.size()) {
     command.fault = format_text("the command's data_offset is %zu, and it has %zu numbers", offset,

@@ -10,7 +10,8 @@ FilterConfig read_filter_config(const XmlRpc::XmlRpcValue& tree, std::vector<std
   RowConfig& rows = config.rows;
   std::size_t type = 0;
   const std::vector<std::string> types = {"trajectory_msgs/JointTrajectory",
-                                          "std_msgs/Float64MultiArray", "sensor_msgs/JointState"};
+                                          "std_msgs/Float64MultiArray", "sensor_msgs/JointState",
+                                          "geometry_msgs/TwistStamped"};
   const Range time = Range::positive("s", 10.0);
   const Range length = Range::non_negative("m", 10.0);
   const Range speed = Range::non_negative("m/s", 100.0);
@@ -18,6 +19,7 @@ FilterConfig read_filter_config(const XmlRpc::XmlRpcValue& tree, std::vector<std
   for (const Parameter& parameter : std::vector<Parameter>{
            {"command_type", choice(&type, types)},
            {"joints", &config.joints},
+           {"tool", &config.tool},
            {"robot_description", &config.robot_description},
            {"command_timeout", &config.command_timeout, time},
            {"proximity_timeout", &config.proximity_timeout, time},

@@ -12,10 +12,13 @@ namespace ist {
 /// The parameters of a velocity filter, read at its start (doc/control.md).
 struct FilterConfig {
   RowConfig rows;
-  /// "trajectory_msgs/JointTrajectory", "std_msgs/Float64MultiArray" or "sensor_msgs/JointState".
+  /// "trajectory_msgs/JointTrajectory", "std_msgs/Float64MultiArray", "sensor_msgs/JointState" or
+  /// "geometry_msgs/TwistStamped".
   std::string command_type = "trajectory_msgs/JointTrajectory";
-  /// Joints of a Float64MultiArray, in order; empty: all that have a position of their own.
+  /// Joints of a Float64MultiArray, in order, or those that realise a twist; empty: all that have a
+  /// position of their own.
   std::vector<std::string> joints;
+  std::string tool;  ///< link that a twist moves; empty: the twist's frame
   std::string robot_description = "robot_description";
   double command_timeout = 0.1;    ///< [s]
   double proximity_timeout = 0.2;  ///< [s] oldest answer that still counts

@@ -1,0 +1,160 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "ros/common/eigen_conversion.h"
+#include "ros/filter/command_message.h"
+#include "support/control_robots.h"
+
+namespace ist {
+namespace {
+
+using Twist = Eigen::Matrix<double, 6, 1>;
+
+constexpr double kNow = 1000.0;  // [s]
+constexpr const char* kTool = "gripper_link";
+
+geometry_msgs::TwistStamped message_of(const std::string& frame, const Twist& twist,
+                                       double stamp = kNow) {
+  geometry_msgs::TwistStamped message;
+  message.header.frame_id = frame;
+  message.header.stamp = ros::Time(stamp);
+  assign(twist.head<3>(), &message.twist.linear);
+  assign(twist.tail<3>(), &message.twist.angular);
+  return message;
+}
+
+class TwistCommand : public ::testing::Test {
+ protected:
+  TwistCommand() : robot_(test::demo_control_robot()), q_(robot_.random_position(&rng_)) {
+    reader_.q = [this](const std::string& name) { return position(q_, name); };
+    reader_.kinematics = robot_.kinematics;
+    reader_.tool = kTool;
+    reader_.now = ros::Time(kNow);
+    reader_.timeout = 0.1;
+    for (const std::size_t j : robot_.joints) {
+      reader_.joints.push_back(robot_.kinematics->joints()[j].name);
+    }
+  }
+
+  double position(const Eigen::VectorXd& q, const std::string& name) const {
+    for (std::size_t c = 0; c < robot_.joints.size(); ++c) {
+      if (robot_.kinematics->joints()[robot_.joints[c]].name == name) {
+        return q[static_cast<Eigen::Index>(c)];
+      }
+    }
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+
+  Eigen::Isometry3d pose(const Eigen::VectorXd& q, const std::string& body) const {
+    std::vector<double> all;
+    for (const Kinematics::Joint& joint : robot_.kinematics->joints()) {
+      all.push_back(position(q, joint.name));
+    }
+    JointPoses joints;
+    BodyPoses bodies;
+    robot_.kinematics->place_joints(all, &joints);
+    robot_.kinematics->place_bodies(joints, Eigen::Isometry3d::Identity(), &bodies);
+    return bodies.X_FB[*robot_.kinematics->find_body(body)];
+  }
+
+  Eigen::VectorXd random_velocity() {
+    std::normal_distribution<double> normal;
+    return Eigen::VectorXd::NullaryExpr(q_.size(), [&] { return normal(rng_); });
+  }
+
+  // The tool's twist by central differences, in the axes of a body.
+  Twist twist(const Eigen::VectorXd& velocity, const std::string& frame) const {
+    const double h = 1e-5;
+    const Eigen::Isometry3d before = pose(q_ - h * velocity, kTool);
+    const Eigen::Isometry3d after = pose(q_ + h * velocity, kTool);
+    const Eigen::AngleAxisd turn(Eigen::Matrix3d(after.linear() * before.linear().transpose()));
+    const Eigen::Matrix3d R_AF = pose(q_, frame).linear().transpose();
+    Twist result;
+    result << R_AF * (after.translation() - before.translation()),
+        R_AF * (turn.angle() * turn.axis());
+    return result / (2.0 * h);
+  }
+
+  void expect_fault(const geometry_msgs::TwistStamped& message, const std::string& text) const {
+    const JointCommand command = read_command(message, reader_);
+    EXPECT_NE(command.fault.find(text), std::string::npos) << command.fault;
+  }
+
+  test::Rng rng_{7};
+  test::ControlRobot robot_;
+  Eigen::VectorXd q_;
+  CommandReader reader_;
+};
+
+TEST_F(TwistCommand, IsWhatTheJointsMakeOfTheTool) {
+  for (int k = 0; k < 200; ++k) {
+    q_ = robot_.random_position(&rng_);
+    for (const char* frame : {kTool, "base_link", "forearm_link"}) {
+      const Twist wanted = twist(random_velocity(), frame);
+      const JointCommand command = read_command(message_of(frame, wanted), reader_);
+      if (!command.fault.empty()) {  // next to a singular pose
+        EXPECT_NE(command.fault.find("cannot move so"), std::string::npos) << command.fault;
+        continue;
+      }
+      Eigen::VectorXd velocity = Eigen::VectorXd::Zero(q_.size());
+      for (std::size_t i = 0; i < command.joints.size(); ++i) {
+        for (std::size_t c = 0; c < reader_.joints.size(); ++c) {
+          if (reader_.joints[c] != command.joints[i]) continue;
+          velocity[static_cast<Eigen::Index>(c)] = command.velocity[i];
+        }
+      }
+      EXPECT_LT((twist(velocity, frame) - wanted).norm(), 1e-5 * (1.0 + velocity.norm()));
+      geometry_msgs::TwistStamped given = message_of(frame, Twist::Zero());
+      set_velocity(command, command.velocity, reader_.q, &given);
+      EXPECT_LT((to_vector(given.twist.linear) - wanted.head<3>()).norm(), 1e-5 * wanted.norm());
+      EXPECT_LT((to_vector(given.twist.angular) - wanted.tail<3>()).norm(), 1e-5 * wanted.norm());
+      // A joint that does not move the tool is not commanded.
+      EXPECT_EQ(command.joints.size(), 6u);
+    }
+  }
+}
+
+TEST_F(TwistCommand, OfASingularPoseIsTheLeastVelocityOrNone) {
+  for (std::size_t c = 0; c < reader_.joints.size(); ++c) {
+    if (reader_.joints[c] == "wrist_pitch") q_[static_cast<Eigen::Index>(c)] = 0.0;
+  }
+  const Eigen::VectorXd some = random_velocity();
+  const JointCommand command = read_command(message_of(kTool, twist(some, kTool)), reader_);
+  ASSERT_EQ(command.fault, "");
+  EXPECT_LT(Eigen::Map<const Eigen::VectorXd>(command.velocity.data(), 6).norm(), some.norm());
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(command.jacobian, Eigen::ComputeFullU);
+  ASSERT_LT(svd.singularValues()[5], 1e-6);
+  expect_fault(message_of(kTool, svd.matrixU().col(5)), "cannot move so");
+}
+
+TEST_F(TwistCommand, ThatCannotBeUsedIsTold) {
+  const Twist twist = Twist::Constant(0.1);
+  for (int k = 0; k < 6; ++k) {
+    for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+      Twist wrong = twist;
+      wrong[k] = bad;
+      expect_fault(message_of(kTool, wrong), "not a finite number");
+    }
+  }
+  expect_fault(message_of("world", twist), "no link 'world'");
+  expect_fault(message_of("", twist), "no link ''");
+  expect_fault(message_of(kTool, twist, 0.0), "no stamp");
+  expect_fault(message_of(kTool, twist, kNow - 0.2), "stamp is 0.20 s old");
+  expect_fault(message_of(kTool, twist, kNow + 5.0), "ahead of the clock");
+  reader_.tool = "tool";
+  expect_fault(message_of(kTool, twist), "no link 'tool'");
+  reader_.tool.clear();
+  expect_fault(message_of("base_link", twist), "no joint moves 'base_link'");
+  reader_.q = [](const std::string&) { return std::nan(""); };
+  expect_fault(message_of(kTool, twist), "does not follow from the joint states");
+}
+
+}  // namespace
+}  // namespace ist
