@@ -101,6 +101,11 @@ void ConstraintRowBuilder::begin(const BodyPoses& bodies, const RowConfig& confi
       bodies.X_FB.size() == count && bodies.known.size() == count && is_usable(config);
 }
 
+void ConstraintRowBuilder::set_config(const RowConfig& config) {
+  config_ = config;
+  if (!is_usable(config) || config.horizon != rows_.horizon) rows_.is_complete = false;
+}
+
 void ConstraintRowBuilder::add_links(Span<const LinkProximity> answers,
                                      Span<const double> obstacle_speeds) {
   if (answers.size() != links_.size() ||

@@ -230,6 +230,8 @@ class LaunchFilesTest(unittest.TestCase):
         manager = configuration("proximity.rviz")["Visualization Manager"]
         worlds = [d["Marker Topic"] for d in manager["Displays"] if "Known world" in d["Name"]]
         self.assertEqual(worlds, ["/shown/near/world/cell"])
+        topics = {d.get("Marker Topic") for d in manager["Displays"]}
+        self.assertIn("/shown/filter/filter_markers", topics)
         self.assertEqual(manager["Global Options"]["Fixed Frame"], "odom")
         for display in manager["Displays"]:  # "<Fixed Frame>" of a display stays
             if "Reference Frame" in display:

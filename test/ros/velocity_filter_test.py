@@ -12,10 +12,12 @@ import proximity_testing as pt
 import rospy
 from geometry_msgs.msg import TwistStamped, Vector3
 from ist_proximity.msg import FilterState
+from ist_proximity.srv import IgnoreLinks
 from proximity_testing import ProximityArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from visualization_msgs.msg import Marker, MarkerArray
 
 SLIDES = """<robot name="slides">
   <link name="base"/>
@@ -25,6 +27,12 @@ SLIDES = """<robot name="slides">
     <axis xyz="1 0 0"/><limit lower="-5" upper="5" velocity="2" effort="1"/></joint>
   <joint name="across" type="prismatic"><parent link="beam"/><child link="ball"/>
     <axis xyz="0 1 0"/><limit lower="-5" upper="5" velocity="0.4" effort="1"/></joint>
+</robot>"""
+
+# A post beside the ball's way, 0.3 m from it at the start.
+POST = """  <link name="post"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="to_post" type="fixed"><parent link="base"/><child link="post"/>
+    <origin xyz="0 0.5 0"/></joint>
 </robot>"""
 
 WALL = 1.0  # [m] along x
@@ -87,8 +95,15 @@ class VelocityFilterTest(unittest.TestCase):
         )
         self.nearest = np.inf
         self.robot = self.world.repeat(1.0 / PERIOD, self.move)
+        has_post = "post" in self._testMethodName
         self.node = pt.ProximityNode(
-            self.namespace, {"pose_source": "joint_states", "self_filter": False}, SLIDES
+            self.namespace,
+            {
+                "pose_source": "joint_states",
+                "self_filter": False,
+                "self_collision/enabled": has_post,
+            },
+            SLIDES.replace("</robot>", POST) if has_post else SLIDES,
         )
         self.node.wait_for_status(ProximityArray.OK)
 
@@ -176,6 +191,25 @@ class VelocityFilterTest(unittest.TestCase):
         self.assertLess(WALL - RADIUS - self.q[0], STOP + 0.15)
         # Along the wall it still goes.
         self.assertGreater(self.velocity[1], 0.05)
+        # The row that binds is drawn.
+        drawn = []
+        listener = rospy.Subscriber(
+            self.filter.name + "/filter_markers", MarkerArray, lambda m: drawn.append(m.markers)
+        )
+        pt.wait_until(lambda: len(drawn) > 2, "markers")
+        listener.unregister()
+        self.assertEqual(
+            [(m.type, m.action) for m in drawn[-1]],
+            [
+                (Marker.ARROW, Marker.DELETEALL),
+                (Marker.LINE_LIST, Marker.ADD),
+                (Marker.TEXT_VIEW_FACING, Marker.ADD),
+            ],
+        )
+        wall_point, ball_point = drawn[-1][1].points
+        self.assertAlmostEqual(wall_point.x, WALL, 3)
+        self.assertAlmostEqual(ball_point.x, self.q[0] + RADIUS, 2)
+        self.assertIn("'ball' is 0.0", drawn[-1][2].text)
         # Away from it as commanded, at once.
         self.wanted = (-0.3, 0.0)
         free = self.wait_for(FilterState.FREE)
@@ -189,6 +223,36 @@ class VelocityFilterTest(unittest.TestCase):
         # Positions follow the given velocity.
         given = self.filter.given[-1].points[0]
         self.assertLess(abs(given.positions[1] - self.q[1]), 0.2)
+
+    def test_stops_before_a_post_of_its_own(self):
+        self.start(0.0, 0.4, self_proximity=True)
+        limited = self.wait_for(FilterState.LIMITED)
+        self.assertEqual(set(limited.links + limited.sources), {"ball", "post"})
+        pt.wait_until(lambda: abs(self.velocity[1]) < 0.01, "the ball to stand")
+        apart = np.hypot(self.q[0], self.q[1] - 0.5) - 0.2
+        self.assertGreater(apart, 0.005)
+        self.assertLess(apart, 0.02)
+        self.wanted = (0.0, -0.3)
+        free = self.wait_for(FilterState.FREE)
+        self.assertEqual(list(free.velocity), [0.0, -0.3])
+
+    def test_distances_from_link_to_link_that_do_not_come(self):
+        self.start(0.1, 0.0, self_proximity=True)
+        self.check_fault("no distances have come on '%s/proximity/self_proximity'" % self.namespace)
+
+    def test_ignored_links(self):
+        """The robot stands near the wall, and is to touch it."""
+        self.q = np.array([WALL - RADIUS - 0.02, 0.0])
+        self.node.wait_for(lambda m: m.links[0].distance < 0.03, "the ball at the wall")
+        self.robot.function = lambda: self.send_joints(self.q)
+        self.start(0.2, 0.0)
+        self.wait_for(FilterState.LIMITED)
+        ignore = rospy.ServiceProxy(self.node.name + "/ignore_links", IgnoreLinks)
+        self.assertTrue(ignore(["ball"], 2.0).success)
+        free = self.wait_for(FilterState.FREE)
+        self.assertEqual(free.ignored_links, ["ball"])
+        self.assertEqual(list(free.velocity), [0.2, 0.0])
+        self.assertEqual(self.wait_for(FilterState.LIMITED).ignored_links, [])
 
     def test_twist_of_the_ball(self):
         self.start(0.5, 0.1, command_type="geometry_msgs/TwistStamped")

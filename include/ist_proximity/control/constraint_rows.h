@@ -133,6 +133,8 @@ class ConstraintRowBuilder {
   /// @param bodies  ForwardKinematics::bodies(), at the instant of the answers; must outlive the
   ///                calls of add_links() and add_pairs()
   void begin(const BodyPoses& bodies, const RowConfig& config);
+  /// Bounds what is added from here on in another way, such as pairs; the horizon is begin()'s.
+  void set_config(const RowConfig& config);
   /// Adds the answers of a ProximityQuery or of a WorldQuery. May be called for several.
   /// @param answers          by link of the model
   /// @param obstacle_speeds  [m/s] by link, such as ClosingRates::obstacles; raises the

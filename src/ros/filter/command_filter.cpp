@@ -60,7 +60,12 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
   }
   state_ = private_nh_.advertise<FilterState>("filter_state", 10);
   scale_ = private_nh_.advertise<std_msgs::Float64>("speed_scale", 10);
+  markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("filter_markers", 1);
   read_robot();
+  if (config_.self_proximity) {
+    self_answers_ = nh_.subscribe("proximity/self_proximity", 1, &CommandFilter::take_self, this,
+                                  ros::TransportHints().tcpNoDelay());
+  }
   answers_ = nh_.subscribe("proximity/proximity", 1, &CommandFilter::take_answers, this,
                            ros::TransportHints().tcpNoDelay());
   joints_ = nh_.subscribe("joint_states", 50, &CommandFilter::take_joints, this,
@@ -102,9 +107,8 @@ void CommandFilter::receive(const Message& message) {
   const auto begin = Clock::now();
   clock_has_gone_back();
   const auto q = [this](const std::string& joint) { return position_of(joint); };
-  const JointCommand command =
-      read_command(message, {config_.joints, q, kinematics_, config_.tool, ros::Time::now(),
-                             config_.command_timeout});
+  const JointCommand command = read_command(message, {config_.joints, q, kinematics_, config_.tool,
+                                                      ros::Time::now(), config_.command_timeout});
   const auto give = [this, q, message, command](const std::vector<double>& velocity,
                                                 FilterState* state, double time) {
     Message given = message;
@@ -173,25 +177,34 @@ void CommandFilter::take_scale(const std_msgs::Float64& scale) {
 }
 
 void CommandFilter::take_answers(const ist_proximity::ProximityArray::ConstPtr& answers) {
+  take(answers, &obstacles_);
+}
+
+void CommandFilter::take_self(const ist_proximity::ProximityArray::ConstPtr& answers) {
+  take(answers, &self_);
+}
+
+void CommandFilter::take(const ist_proximity::ProximityArray::ConstPtr& answers,
+                         PlacedAnswers* placed) {
   clock_has_gone_back();
   if (!proximity_) return;
   const std::string frame = without_slash(answers->header.frame_id);
   const std::string& root = kinematics_->bodies()[0];
-  Eigen::Isometry3d X_RF = Eigen::Isometry3d::Identity();
-  transform_fault_.clear();
+  *placed = PlacedAnswers();
+  placed->message = answers;
   if (frame != root) {
     try {
       const auto transform = tf_.lookupTransform(root, frame, answers->header.stamp).transform;
-      transform_fault_ = to_isometry(transform, &X_RF);
+      placed->fault = to_isometry(transform, &placed->X_RF);
     } catch (const tf2::TransformException& error) {
-      transform_fault_ = error.what();
+      placed->fault = error.what();
     }
   }
-  if (!transform_fault_.empty()) {
-    transform_fault_ = "the distances are in '" + frame + "', which is not placed in '" + root +
-                       "': " + transform_fault_;
+  if (!placed->fault.empty()) {
+    placed->fault = "the distances are in '" + frame + "', which is not placed in '" + root +
+                    "': " + placed->fault;
   }
-  proximity_->set(answers, X_RF);
+  if (obstacles_.message) proximity_->set(obstacles_.message, self_.message);
 }
 
 bool CommandFilter::clock_has_gone_back() {
@@ -201,7 +214,7 @@ bool CommandFilter::clock_has_gone_back() {
   if (!has) return false;
   tf_.clear();
   if (history_) history_->clear();
-  if (proximity_) proximity_->clear();
+  obstacles_ = self_ = PlacedAnswers();
   newest_scale_ = 0.0;
   if (halt_) halt_("the clock has gone back");
   return true;
@@ -246,20 +259,30 @@ std::string CommandFilter::why_not(const JointCommand& command, const ros::Time&
   }
   std::string late = history_->late_joint(now, config_.joint_timeout);
   if (!late.empty()) return late;
-  if (!proximity_->has_answers()) {
-    return "no distances have come on '" + answers_.getTopic() + "' yet";
-  }
-  const ist_proximity::ProximityArray& answers = proximity_->answers();
+  std::string fault = why_not(obstacles_, answers_, now);
+  if (!config_.self_proximity || !fault.empty()) return fault;
+  fault = why_not(self_, self_answers_, now);
+  if (!fault.empty()) return fault;
+  const ist_proximity::ProximityArray& self = *self_.message;
+  const bool is_measured = self.status != ist_proximity::ProximityArray::LOADING &&
+                           self.status != ist_proximity::ProximityArray::MODEL_ERROR;
+  return is_measured ? "" : "no distances from link to link: " + self.status_text;
+}
+
+std::string CommandFilter::why_not(const PlacedAnswers& placed, const ros::Subscriber& subscriber,
+                                   const ros::Time& now) const {
+  if (!placed.message) return "no distances have come on '" + subscriber.getTopic() + "' yet";
+  const ist_proximity::ProximityArray& answers = *placed.message;
   if (answers.links.empty()) return "the distances are of no link: " + answers.status_text;
   const double age = seconds_between(answers.header.stamp, now);
   if (age > config_.proximity_timeout) {
-    return format_text("the distances are %.2f s old; ~proximity_timeout is %g s", age,
-                       config_.proximity_timeout);
+    return format_text("the distances of '%s' are %.2f s old; ~proximity_timeout is %g s",
+                       subscriber.getTopic().c_str(), age, config_.proximity_timeout);
   }
   if (age < -kMaxAhead) {
     return format_text("the distances are %.2f s ahead of the clock; compare the clocks", -age);
   }
-  return transform_fault_;
+  return placed.fault;
 }
 
 std::vector<double> CommandFilter::filter(const JointCommand& command, FilterState* state) {
@@ -270,7 +293,9 @@ std::vector<double> CommandFilter::filter(const JointCommand& command, FilterSta
   given_scale_ = 0.0;
   std::vector<double> velocity(command.joints.size(), 0.0);
   state->status_text = why_not(command, now);
-  if (state->status_text.empty() && !history_->at(proximity_->answers().header.stamp, &q_then_)) {
+  for (PlacedAnswers* placed : {&obstacles_, &self_}) {
+    if (!state->status_text.empty() || !placed->message) continue;
+    if (history_->at(placed->message->header.stamp, &placed->q)) continue;
     state->status_text = "the joint states do not reach back to the distances' stamp";
   }
   if (!state->status_text.empty()) {
@@ -284,6 +309,7 @@ std::vector<double> CommandFilter::filter(const JointCommand& command, FilterSta
     velocity[i] = answer.velocity[*column_of(command.joints[i])];
   }
   explain(answer, state);
+  if (markers_.getNumSubscribers() > 0) draw(answer, state->header);
   if (command.jacobian.size() == 0 || state->status != FilterState::LIMITED ||
       (state->limited_joints.empty() && is_twist_proven(command, velocity))) {
     return velocity;
@@ -312,7 +338,7 @@ bool CommandFilter::is_twist_proven(const JointCommand& command,
 }
 
 const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::Time& now) {
-  const ist_proximity::ProximityArray& answers = proximity_->answers();
+  const ist_proximity::ProximityArray& answers = *obstacles_.message;
   history_->at(now, &q_now_);
   RowConfig config = config_.rows;
   const ros::Time& seen = answers.cloud_stamp.isZero() ? answers.header.stamp : answers.cloud_stamp;
@@ -320,7 +346,7 @@ const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::T
   // The robot has gone on since its joints were stated.
   config.horizon += history_->age(now);
   config.approach_time = std::max(config.approach_time, config.horizon);
-  rows_ = proximity_->rows(q_then_, q_now_, config);
+  rows_ = proximity_->rows(obstacles_, self_, q_now_, config, config_.self_stop_distance);
 
   std::vector<bool> is_commanded(command_column_.size(), false);
   std::fill(command_column_.begin(), command_column_.end(), 0.0);
@@ -350,34 +376,6 @@ void CommandFilter::hold_others(const std::vector<bool>& is_commanded, const ros
       rows_.G(i, column) = rows_.sweep(i, column) = 0.0;
     }
   }
-}
-
-void CommandFilter::explain(const FilterAnswer& answer, FilterState* state) const {
-  state->status = static_cast<std::uint8_t>(answer.status);
-  std::vector<std::string> texts;
-  if (answer.reason != FilterReason::kNone) texts.emplace_back(sentence(answer.reason));
-  for (const std::size_t row : answer.rows) {
-    const RowOrigin& origin = rows_.origins[row];
-    const ist_proximity::LinkProximity& link = proximity_->answer(origin);
-    if (std::find(state->links.begin(), state->links.end(), link.link) != state->links.end()) {
-      continue;
-    }
-    state->links.push_back(link.link);
-    state->sources.push_back(link.source);
-    state->bounds.push_back(link.lower_bound);
-    texts.push_back(origin.state == LinkState::kUnknown
-                        ? "what is near '" + link.link + "' is not known"
-                        : format_text("'%s' is %.3f m from '%s' at least", link.link.c_str(),
-                                      link.lower_bound, link.source.c_str()));
-  }
-  for (const std::size_t column : answer.joints) {
-    const std::string& name = kinematics_->joints()[proximity_->joints()[column]].name;
-    auto& joints = state->limited_joints;
-    if (std::find(joints.begin(), joints.end(), name) != joints.end()) continue;
-    joints.push_back(name);
-    texts.push_back("joint '" + name + "' is at a limit");
-  }
-  state->status_text = join(texts, "; ");
 }
 
 }  // namespace ist

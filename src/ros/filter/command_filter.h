@@ -6,6 +6,7 @@
 #include <std_msgs/Float64.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <functional>
 #include <memory>
@@ -40,6 +41,8 @@ class CommandFilter {
   void receive(const Message& message);
   void read_robot();
   void take_answers(const ist_proximity::ProximityArray::ConstPtr& answers);
+  void take_self(const ist_proximity::ProximityArray::ConstPtr& answers);
+  void take(const ist_proximity::ProximityArray::ConstPtr& answers, PlacedAnswers* placed);
   void take_joints(const sensor_msgs::JointState& message);
   void take_scale(const std_msgs::Float64& scale);
   void on_timer();
@@ -48,10 +51,13 @@ class CommandFilter {
   /// The given velocities, by joint of the command.
   std::vector<double> filter(const JointCommand& command, ist_proximity::FilterState* state);
   std::string why_not(const JointCommand& command, const ros::Time& now) const;
+  std::string why_not(const PlacedAnswers& answers, const ros::Subscriber& subscriber,
+                      const ros::Time& now) const;
   const FilterAnswer& run(const JointCommand& command, const ros::Time& now);
   bool is_twist_proven(const JointCommand& command, const std::vector<double>& velocity);
   void hold_others(const std::vector<bool>& is_commanded, const ros::Time& now);
   void explain(const FilterAnswer& answer, ist_proximity::FilterState* state) const;
+  void draw(const FilterAnswer& answer, const std_msgs::Header& header) const;
   std::optional<std::size_t> column_of(const std::string& joint) const;
   double position_of(const std::string& joint) const;
 
@@ -66,12 +72,12 @@ class CommandFilter {
   std::optional<JointHistory> history_;
   std::optional<ProximityRows> proximity_;
   std::optional<VelocityFilter> filter_;
-  std::string transform_fault_;  ///< why the newest answers cannot be used; empty: they can
+  PlacedAnswers obstacles_, self_;
   ConstraintRows rows_;
-  std::vector<double> q_then_, q_now_, q_before_, q_column_, command_column_;
+  std::vector<double> q_now_, q_before_, q_column_, command_column_;
 
-  ros::Publisher safe_command_, state_, scale_;
-  ros::Subscriber command_, answers_, joints_, node_scale_;
+  ros::Publisher safe_command_, state_, scale_, markers_;
+  ros::Subscriber command_, answers_, self_answers_, joints_, node_scale_;
   ros::WallTimer timer_;
   ros::Time last_now_, last_command_;
   double given_scale_ = 0.0;   ///< of the last command

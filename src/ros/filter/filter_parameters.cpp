@@ -21,6 +21,8 @@ FilterConfig read_filter_config(const XmlRpc::XmlRpcValue& tree, std::vector<std
            {"joints", &config.joints},
            {"tool", &config.tool},
            {"robot_description", &config.robot_description},
+           {"self_proximity", &config.self_proximity},
+           {"self_stop_distance", &config.self_stop_distance, length},
            {"command_timeout", &config.command_timeout, time},
            {"proximity_timeout", &config.proximity_timeout, time},
            {"joint_timeout", &config.joint_timeout, time},
