@@ -10,6 +10,7 @@
 
 #include "internal/geometry/numbers.h"
 #include "internal/robot/threads.h"
+#include "ist_proximity/control/constraint_rows.h"
 #include "ist_proximity/facade/robot.h"
 #include "ist_proximity/proximity/time_of_impact.h"
 
@@ -68,6 +69,45 @@ Rows by_joint(const Rows& rows, const std::vector<std::size_t>& free_joints, std
   return all;
 }
 
+QueryConfig exact(QueryConfig config) {
+  config.tolerance = config.deadline = 0.0;
+  return config;
+}
+
+// Sets gradients where links are nearest. One thread.
+class Gradients {
+ public:
+  Gradients(const Robot& robot, const QueryConfig& config)
+      : forward_(*robot.model(), robot.kinematics()),
+        query_(robot.model(), exact(config)),
+        rows_(*robot.model(), robot.kinematics()),
+        wanted_(robot.links().size(), false) {}
+
+  void set(const StraightPieces& pieces, const Obstacles& obstacles, std::size_t link,
+           LinkClearance* found) {
+    if (!std::isfinite(found->nearest_time)) return;
+    const LinkPoses& poses = forward_.run(positions_at(pieces, found->nearest_time));
+    wanted_[link] = true;
+    query_.run(poses.X_FL, wanted_, {&obstacles.snapshot()}, &answers_);
+    wanted_[link] = false;
+    if (answers_[link].state != LinkState::kNear) return;
+    rows_.begin(forward_.bodies(), RowConfig());
+    rows_.add_link(link, answers_[link]);
+    found->gradient.assign(rows_.joints().size(), 0.0);
+    if (rows_.rows().count == 0) return;  // no joint moves the link
+    for (std::size_t j = 0; j < found->gradient.size(); ++j) {
+      found->gradient[j] = -rows_.rows().G(0, static_cast<Eigen::Index>(j));
+    }
+  }
+
+ private:
+  ForwardKinematics forward_;
+  ProximityQuery query_;
+  ConstraintRowBuilder rows_;
+  std::vector<bool> wanted_;  // by link: the one that is being asked
+  std::vector<LinkProximity> answers_;
+};
+
 }  // namespace
 
 std::vector<LinkClearance> Robot::clearance(Span<const JointTrajectory> trajectories,
@@ -83,6 +123,7 @@ std::vector<LinkClearance> Robot::clearance(Span<const JointTrajectory> trajecto
   std::atomic<std::size_t> next{0};
   run_on_threads(std::min(trajectories.size(), thread_count(config.threads)), [&](std::size_t) {
     TimeOfImpact impacts(model(), kinematics(), config.query);
+    Gradients gradients(*this, config.query);
     std::vector<LinkClearance> found;
     for (std::size_t k; (k = next++) < trajectories.size();) {
       const JointTrajectory& given = trajectories[k];
@@ -91,9 +132,13 @@ std::vector<LinkClearance> Robot::clearance(Span<const JointTrajectory> trajecto
                                        by_joint(given.accelerations, free_joints, count)};
       JointPoses still;
       kinematics()->place_joints(trajectory.positions.front(), &still);
-      impacts.run(straight_pieces(trajectory), trajectory.times.front(), still,
-                  Eigen::Isometry3d::Identity(), std::vector<bool>(links().size(), true),
-                  {&obstacles.snapshot()}, {}, 0.0, 0.0, &found);
+      const StraightPieces pieces = straight_pieces(trajectory);
+      impacts.run(pieces, trajectory.times.front(), still, Eigen::Isometry3d::Identity(),
+                  std::vector<bool>(links().size(), true), {&obstacles.snapshot()}, {}, 0.0, 0.0,
+                  &found);
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        gradients.set(pieces, obstacles, i, &found[i]);
+      }
       std::copy(found.begin(), found.end(),
                 results.begin() + static_cast<std::ptrdiff_t>(k * links().size()));
     }

@@ -13,6 +13,12 @@ bool MovedRobot::begin(const JointMotion& motion, const JointPoses& still) {
     return false;
   }
   if (!(motion.duration > 0.0) || !std::isfinite(motion.duration)) return false;
+  for (std::size_t j = 0; j < joints; ++j) {
+    if (std::isnan(motion.from[j]) != std::isnan(motion.to[j])) return false;
+    if (std::abs(motion.from[j]) > kLargestMotion || std::abs(motion.to[j]) > kLargestMotion) {
+      return false;
+    }
+  }
   motion_ = motion;
   place_mimics(kinematics(), &motion_);
   still_ = &still;

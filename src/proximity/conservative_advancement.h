@@ -12,6 +12,9 @@
 
 namespace ist {
 
+/// [rad, m] Sums of larger positions are rounded by more than what counts as contact.
+constexpr double kLargestMotion = 1e9;
+
 /// The links of a robot along a motion of its joints.
 class MovedRobot {
  public:
@@ -20,8 +23,8 @@ class MovedRobot {
 
   /// Begins a motion.
   /// @param still  poses of joints that it does not move; outlives the motion
-  /// @returns false where the sizes are not those of the kinematics' joints, or the duration is not
-  ///          finite and more than 0
+  /// @returns false where the sizes are not those of the kinematics' joints, the duration is not
+  ///          finite and more than 0, or a joint has one position or a too large one
   bool begin(const JointMotion& motion, const JointPoses& still);
   /// Places the links where they are after `time` [s]. @param X_FR  root link -> fixed frame
   void place(double time, const Eigen::Isometry3d& X_FR = Eigen::Isometry3d::Identity());

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+
+#include "internal/geometry/numbers.h"
 
 namespace ist {
 namespace {
@@ -21,11 +24,13 @@ struct Polynomial {
     }
     return p[0];
   }
-  // The largest second derivative for s from 0 to 1, or more.
+  // The largest second derivative for s from 0 to 1, or more; 0 for a joint without positions.
   double curvature() const {
+    if (std::isnan(points[0])) return 0.0;
     double largest = 0.0;
     for (std::size_t i = 0; i + 2 <= degree; ++i) {
-      largest = std::max(largest, std::abs(points[i + 2] - 2.0 * points[i + 1] + points[i]));
+      const double one = std::abs(points[i + 2] - 2.0 * points[i + 1] + points[i]);
+      largest = std::isnan(one) ? kInfinity : std::max(largest, one);  // inf - inf
     }
     return static_cast<double>(degree * (degree - 1)) * largest;
   }
@@ -55,7 +60,7 @@ StraightPieces straight_pieces(const JointTrajectory& trajectory, double max_dev
     double curvature = 0.0;
     for (std::size_t j = 0; j < trajectory.positions[k].size(); ++j) {
       joints.push_back(polynomial(trajectory, k, j));
-      curvature = std::fmax(curvature, joints.back().curvature());  // NaN does not count
+      curvature = std::max(curvature, joints.back().curvature());
     }
     const double wanted = std::ceil(std::sqrt(curvature / (8.0 * max_deviation)));
     const double count = std::clamp(wanted, 1.0, kMostPieces);
@@ -65,7 +70,7 @@ StraightPieces straight_pieces(const JointTrajectory& trajectory, double max_dev
       std::vector<double> positions, deviations;
       for (std::size_t j = 0; j < joints.size(); ++j) {
         positions.push_back(i == 0.0 ? trajectory.positions[k][j] : joints[j].at(i / count));
-        deviations.push_back(std::fmax(joints[j].curvature() / (8.0 * count * count), 0.0));
+        deviations.push_back(joints[j].curvature() / (8.0 * count * count));
       }
       pieces.positions.push_back(std::move(positions));
       pieces.deviations.push_back(std::move(deviations));
@@ -76,6 +81,33 @@ StraightPieces straight_pieces(const JointTrajectory& trajectory, double max_dev
     pieces.positions.push_back(trajectory.positions.back());
   }
   return pieces;
+}
+
+std::vector<double> positions_at(const StraightPieces& pieces, double time) {
+  const auto after = std::upper_bound(pieces.times.begin(), pieces.times.end(), time);
+  if (after == pieces.times.begin()) return pieces.positions.front();
+  if (after == pieces.times.end()) return pieces.positions.back();
+  const auto k = static_cast<std::size_t>(std::distance(pieces.times.begin(), after));
+  const double s = (time - pieces.times[k - 1]) / (pieces.times[k] - pieces.times[k - 1]);
+  std::vector<double> q = pieces.positions[k - 1];
+  for (std::size_t j = 0; j < q.size(); ++j) q[j] += s * (pieces.positions[k][j] - q[j]);
+  return q;
+}
+
+double braking_way(const StraightPieces& pieces, double from, double until, double deceleration) {
+  double rate = kInfinity;  // [1/s] at which time can be slowed down
+  for (std::size_t k = 0; k + 1 < pieces.times.size(); ++k) {
+    if (pieces.times[k + 1] <= from || pieces.times[k] >= until) continue;
+    const double span = pieces.times[k + 1] - pieces.times[k];
+    for (std::size_t j = 0; j < pieces.deviations[k].size(); ++j) {
+      // A polynomial is this far from its chord where its second derivative is that of the bound.
+      const double acceleration = 8.0 * pieces.deviations[k][j] / (span * span);
+      const double change = std::abs(pieces.positions[k + 1][j] - pieces.positions[k][j]);
+      const double speed = change / span + 0.5 * acceleration * span;
+      if (speed > 0.0) rate = std::min(rate, (deceleration - acceleration) / speed);
+    }
+  }
+  return rate > 0.0 ? 0.5 / rate : kInfinity;
 }
 
 }  // namespace ist

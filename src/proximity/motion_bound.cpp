@@ -9,7 +9,7 @@ double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion) {
   if (joint.type == JointType::kFixed || joint.has_unstated_pose()) return 0.0;
   const std::size_t index = joint.child - 1;
   const double change = motion.to[index] - motion.from[index];
-  return std::isfinite(change) ? std::abs(change) / motion.duration : 0.0;
+  return std::isnan(change) ? 0.0 : std::abs(change) / motion.duration;
 }
 
 void place_mimics(const Kinematics& kinematics, JointMotion* motion) {

@@ -12,12 +12,15 @@
 namespace ist {
 namespace {
 
-constexpr double kTouch = 1e-4;            // [m] a bound below it is contact
+constexpr double kTouch = 1e-4;            // [m] a bound below it is contact, of what stands
 constexpr double kLeastStep = 2e-3;        // [m] between two distances, while there is as much room
 constexpr double kShareOfDistance = 0.25;  // the same, of the distance
 constexpr int kMaxSteps = 4000;
 // Tolerance of the next distance: as a share of the last one, and in [m] at the first.
 constexpr double kRelativeTolerance = 0.1, kFirstTolerance = 0.01;
+// [s] Where obstacles come nearer, nothing need be known better than by what they come in this
+// time, and no first distance better than in the other.
+constexpr double kInTime = 2e-3, kFirstInTime = 0.02;
 
 // A link on its way.
 struct Advance {
@@ -29,6 +32,11 @@ struct Advance {
   double least = kInfinity;            // [m] of the bounds that were measured
   double tolerance = kFirstTolerance;  // [m]
 };
+
+bool are_bounded(const std::vector<double>& deviations) {
+  return std::all_of(deviations.begin(), deviations.end(),
+                     [](double one) { return one >= 0.0 && one <= kLargestMotion; });
+}
 
 }  // namespace
 
@@ -92,13 +100,13 @@ class TimeOfImpact::Impl::Piece {
     return largest;
   }
 
-  // [m] A lower bound of the distance; exact where the link seems to be in contact.
+  // [m] A lower bound of the distance; as good as it gets where the link seems to be in contact.
   double measure(Advance* advance, double time, double tube) {
     const double come = obstacle_speed_ * (obstacle_age_ + begin_ + time - from_);
     impl_.moving[advance->link] = true;
     double distance = impl_.measure(advance->link, obstacles_, advance->tolerance) - come;
-    if (distance - tube <= kTouch) {
-      distance = impl_.measure(advance->link, obstacles_, 0.0) - come;
+    if (distance - tube <= touch_ && advance->tolerance > best_) {
+      distance = impl_.measure(advance->link, obstacles_, best_) - come;
     }
     impl_.moving[advance->link] = false;
     ++advance->found->steps;
@@ -108,7 +116,7 @@ class TimeOfImpact::Impl::Piece {
   // Takes a bound into the result. @returns false where that ends the advance
   bool take(double distance, double time, double tube, Advance* advance) const {
     LinkClearance* found = advance->found;
-    // The first one is exact: a contact there is told for the time that was asked for.
+    // The first one is the best: a contact there is told for the time that was asked for.
     const double now = found->steps == 1 ? std::max(from_, begin_) : begin_ + time;
     if (std::isnan(distance)) {
       const int steps = found->steps;
@@ -121,7 +129,7 @@ class TimeOfImpact::Impl::Piece {
       advance->least = distance;
       found->nearest_time = now;
     }
-    const bool is_contact = distance - tube <= kTouch;
+    const bool is_contact = distance - tube <= touch_;
     if (is_contact || found->steps >= kMaxSteps) {
       found->contact_time = now;
       found->converged = is_contact;
@@ -132,7 +140,8 @@ class TimeOfImpact::Impl::Piece {
     // This distance need not be known better than those where others were nearer.
     const double step = std::max(kLeastStep + tube, kShareOfDistance * distance);
     advance->allowance = std::max(distance - advance->least, std::min(step, distance));
-    advance->tolerance = std::min(kFirstTolerance, kRelativeTolerance * distance);
+    const double most = std::max(kFirstTolerance, kFirstInTime * obstacle_speed_);
+    advance->tolerance = std::max(std::min(most, kRelativeTolerance * distance), best_);
     found->lower_bound = std::fmin(found->lower_bound, distance - advance->allowance);
     return true;
   }
@@ -143,7 +152,9 @@ class TimeOfImpact::Impl::Piece {
   const Eigen::Isometry3d& X_FR_;
   const ImpactObstacles& obstacles_;
   const double obstacle_speed_, obstacle_age_;
-  double placed_ = kNaN;  // [s] the robot is where it is then
+  const double best_ = kInTime * obstacle_speed_;  // [m] tolerance
+  const double touch_ = std::max(kTouch, best_);   // [m] a bound below it is contact
+  double placed_ = kNaN;                           // [s] the robot is where it is then
 };
 
 void TimeOfImpact::run(const StraightPieces& pieces, double from, const JointPoses& still,
@@ -158,7 +169,7 @@ void TimeOfImpact::run(const StraightPieces& pieces, double from, const JointPos
                         pieces.positions.size() == pieces.times.size() &&
                         pieces.deviations.size() + 1 == pieces.times.size();
   if (!is_whole || (!worlds.empty() && !impl.worlds) || !(obstacle_speed >= 0.0) ||
-      !(obstacle_age >= 0.0)) {
+      !(obstacle_age >= 0.0) || !std::isfinite(from)) {
     return;
   }
   std::vector<Advance> advances;
@@ -174,7 +185,9 @@ void TimeOfImpact::run(const StraightPieces& pieces, double from, const JointPos
     if (pieces.times[k + 1] <= from) continue;
     const JointMotion motion{pieces.positions[k], pieces.positions[k + 1],
                              pieces.times[k + 1] - pieces.times[k]};
-    if (!impl.moved.begin(motion, still)) return all_unknown();
+    const bool is_known = pieces.deviations[k].size() == pieces.positions[k].size() &&
+                          are_bounded(pieces.deviations[k]);
+    if (!is_known || !impl.moved.begin(motion, still)) return all_unknown();
     impl.bound_carried();
     Impl::Piece piece(&impl, pieces.times[k], from, pieces.deviations[k], X_FR, obstacles,
                       obstacle_speed, obstacle_age);

@@ -304,6 +304,12 @@ py::dict clearance(const Robot& robot, const DoubleArray& times, const DoubleArr
   result["contact_time"] = array(&LinkClearance::contact_time);
   result["lower_bound"] = array(&LinkClearance::lower_bound);
   result["nearest_time"] = array(&LinkClearance::nearest_time);
+  shape.push_back(joints);
+  const auto columns = static_cast<std::size_t>(joints);
+  result["gradient"] = make_array<double>(shape, [&](std::size_t i) {
+    const std::vector<double>& one = answers[i / columns].gradient;
+    return one.empty() ? std::numeric_limits<double>::quiet_NaN() : one[i % columns];
+  });
   return result;
 }
 
@@ -429,7 +435,8 @@ velocities, accelerations: like positions, or none. Joints move straight between
 with velocities, along quintic ones with accelerations too.
 Returns a dictionary of arrays (links,) or (m, links): contact_time [s], never later than the first contact, inf without
 one, nan where it is not known; lower_bound [m] of the distance until the end or that time, at most the least distance and
-less by a quarter of it or 2 mm; nearest_time [s] of the least bound found.)");
+less by a quarter of it or 2 mm; nearest_time [s] of the least bound found; and gradient (links, joints) or (m, links,
+joints) of the distance then, [m/rad, 1] by Robot.joints, nan in contact or with nothing near.)");
   define_measures(&type);
 }
 

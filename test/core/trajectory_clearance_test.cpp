@@ -138,6 +138,46 @@ TEST(TrajectoryClearance, piecesStayNearThePolynomials) {
   EXPECT_GT(largest, 1e-4);
 }
 
+// While time slows down from 1 to 0 steadily, no joint accelerates more than it can.
+TEST(TrajectoryClearance, brakingTakesWhatJointsCan) {
+  test::Rng rng(9);
+  int braked = 0;
+  double least_rest = kInf;
+  for (int i = 0; i < 300; ++i) {
+    const test::Arm arm = test::random_arm(&rng);
+    const Scene scene = random_scene(&rng, arm);
+    const double deceleration = test::uniform(&rng, 2.0, 30.0);
+    const double from = test::uniform(&rng, scene.path.times[0], scene.end());
+    const double until = test::uniform(&rng, from, scene.end());
+    const double way = braking_way(straight_pieces(scene.path), from, until, deceleration);
+    if (way == 0.0 || way > until - from) continue;
+    ++braked;
+    // Time runs at sqrt(1 - u) where a share u of the way is gone, from a begin on until it stands.
+    const double begin = test::uniform(&rng, from, until - way), rate = 0.5 / way;
+    constexpr double kStep = 1e-4;
+    for (double u = 0.0; u < 1.0; u += 0.05) {
+      const double time = begin + u * way;
+      if (time - kStep < from || time + kStep > until) continue;
+      const auto& times = scene.path.times;
+      const auto corner = std::lower_bound(times.begin(), times.end(), time - kStep);
+      if (corner != times.end() && *corner <= time + kStep) continue;  // velocities may jump
+      for (std::size_t j = 0; j < scene.path.positions[0].size(); ++j) {
+        const double before = position(scene.path, j, time - kStep);
+        const double after = position(scene.path, j, time + kStep);
+        if (std::isnan(before)) continue;
+        const double velocity = (after - before) / (2.0 * kStep);
+        const double acceleration =
+            (after - 2.0 * position(scene.path, j, time) + before) / (kStep * kStep);
+        const double asked = std::abs(acceleration * (1.0 - u) - velocity * rate);
+        ASSERT_LE(asked, deceleration + 1e-3);
+        least_rest = std::min(least_rest, deceleration - asked);
+      }
+    }
+  }
+  EXPECT_GT(braked, 50);
+  EXPECT_LT(least_rest, 0.1);
+}
+
 TEST(TrajectoryClearance, neverLateAndHardlyEarly) {
   test::Rng rng(6);
   int trajectories = 0, contacts = 0, close = 0, tight = 0, free = 0;
@@ -291,6 +331,35 @@ TEST(TrajectoryClearance, whatIsNotKnownIsNotFree) {
   broken = pieces;
   broken.positions.back().pop_back();
   EXPECT_TRUE(run(broken, {&cloud}, 0.0)) << "a joint is missing";
+  for (const double wrong : {std::nan(""), kInf, 1e12}) {
+    for (const std::size_t row : {std::size_t{0}, pieces.positions.size() - 1}) {
+      broken = pieces;
+      const auto joint = std::find_if(broken.positions[0].begin(), broken.positions[0].end(),
+                                      [](double q) { return std::isfinite(q); });
+      ASSERT_NE(joint, broken.positions[0].end());
+      broken.positions[row][static_cast<std::size_t>(joint - broken.positions[0].begin())] = wrong;
+      EXPECT_TRUE(run(broken, {&cloud}, 0.0)) << "position " << wrong << " in row " << row;
+    }
+    broken = pieces;
+    broken.deviations[0][0] = wrong;
+    EXPECT_TRUE(run(broken, {&cloud}, 0.0)) << "deviation " << wrong;
+  }
+}
+
+// Velocities whose sums overflow leave no bound of where the joint is.
+TEST(TrajectoryClearance, hugeNumbersAreNotFree) {
+  const Robot robot(R"(<robot name="one"><link name="base"/>
+    <link name="ball"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+    <joint name="slide" type="prismatic"><parent link="base"/><child link="ball"/>
+      <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>)");
+  const Obstacles obstacles(std::vector<Eigen::Vector3d>{{0.5, 0.0, 0.0}});
+  for (const double huge : {1e3, 1e12, 1e100, 1e308}) {
+    for (const double sign : {-1.0, 1.0}) {
+      JointTrajectory path{{0.0, 10.0}, {{0.0}, {0.0}}, {{huge}, {sign * huge}}, {}};
+      const LinkClearance found = robot.clearance({&path, 1}, obstacles)[0];
+      EXPECT_FALSE(found.contact_time > 0.01) << huge << " " << sign;
+    }
+  }
 }
 
 }  // namespace

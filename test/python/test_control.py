@@ -103,6 +103,18 @@ def test_trajectories_are_clear_until_they_touch(robot, obstacles):
             before = samples <= found['contact_time'][k, link]
             assert found['lower_bound'][k, link] <= distance[before, link].min(initial=1.0) + 1e-9
     assert 0 < contacts < 20 * len(robot.links)
+    gradients = found['gradient']
+    assert gradients.shape == positions.shape[:1] + (len(robot.links), len(robot.joints))
+    known = [index for index in np.ndindex(*gradients.shape[:2]) if np.isfinite(gradients[index]).all()]
+    errors = []
+    for k, link in known[:60]:
+        when = found['nearest_time'][k, link]
+        q = np.array([np.interp(when, times, positions[k, :, j]) for j in range(len(robot.joints))])
+        steps = 1e-5 * np.eye(len(q))
+        ahead, behind = [robot.distances(q + sign * steps, obstacles, tolerance=0.0).distance[:, link]
+                         for sign in (1.0, -1.0)]
+        errors.append(np.abs((ahead - behind) / 2e-5 - gradients[k, link]).max())
+    assert len(errors) == 60 and np.median(errors) < 1e-5 and np.quantile(errors, 0.9) < 1e-3
     smooth = robot.clearance(times, positions, obstacles, velocities=np.zeros_like(positions))
     assert smooth['contact_time'].shape == found['contact_time'].shape
     for wrong, text in [((times[::-1], positions), 'rise'), ((times[:2], positions), 'times'),

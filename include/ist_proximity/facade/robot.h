@@ -113,7 +113,8 @@ class Robot {
                                           const Obstacles& obstacles,
                                           const BatchConfig& config = {}) const;
 
-  /// First contacts and clearances along trajectories, on many threads; the obstacles stand still.
+  /// First contacts, clearances and their gradients along trajectories, on many threads; the
+  /// obstacles stand still.
   /// @param trajectories  by joint of joints(); mimic joints follow
   /// @returns as many times the number of links, in the order of the trajectories
   /// @throws std::invalid_argument when sizes differ, times do not rise, numbers are not finite, or

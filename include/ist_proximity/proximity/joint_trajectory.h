@@ -35,6 +35,16 @@ struct StraightPieces {
 /// Thread safe.
 StraightPieces straight_pieces(const JointTrajectory& trajectory, double max_deviation = 5e-4);
 
+/// [rad, m] By joint: where the pieces have the joints at a time [s], or at the nearest time that
+/// they have. NaN for a joint whose positions are. There is a piece or more. Thread safe.
+std::vector<double> positions_at(const StraightPieces& pieces, double time);
+
+/// [s] The most of the trajectory's time that braking along it takes, if it begins at `from` or
+/// later and ends by `until`; +inf where a joint's own acceleration exceeds the deceleration.
+/// Braking slows time down steadily, as fast as every joint can with `deceleration` [rad/s^2,
+/// m/s^2] beside what the trajectory asks of it: it takes twice this long. Thread safe.
+double braking_way(const StraightPieces& pieces, double from, double until, double deceleration);
+
 /// The proven clearance of a link along a trajectory.
 struct LinkClearance {
   /// [s] of the trajectory, never later than the first contact; the first time that was asked for
@@ -47,6 +57,9 @@ struct LinkClearance {
   /// False: the search stopped after many steps; the contact, if any, may be much later.
   bool converged = true;
   int steps = 0;  ///< distance queries
+  /// [m/rad, 1] The gradient of the distance at `nearest_time`, by joint of Robot::joints(); empty
+  /// where the link is in contact or nothing is near. Robot::clearance() alone sets it.
+  std::vector<double> gradient;
 };
 
 }  // namespace ist

@@ -58,8 +58,8 @@ class TimeOfImpact {
   /// @param wanted   by link of the model: false skips the link, and its time is NaN
   /// @param clouds   as for ProximityQuery::run; none makes every link unknown
   /// @param results  by link of the model, overwritten; every time is NaN where the sizes of the
-  /// other
-  ///                 arguments differ or the duration is not finite and more than 0
+  ///                 other arguments differ, the duration is not finite and more than 0, or a joint
+  ///                 has one position or one above 1e9
   void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
            const std::vector<bool>& wanted, SnapshotSpan clouds, std::vector<ImpactTime>* results);
 
@@ -81,6 +81,8 @@ class TimeOfImpact {
   /// @param obstacle_speed  [m/s] >= 0: points and objects may come nearer by so much since `from`
   /// @param obstacle_age    [s] >= 0: and have for so long before it
   /// @param results  by link of the model, overwritten; NaN as above, and where times do not rise
+  /// or
+  ///                 numbers are not finite, or above 1e9
   void run(const StraightPieces& pieces, double from, const JointPoses& still,
            const Eigen::Isometry3d& X_FR, const std::vector<bool>& wanted, SnapshotSpan clouds,
            Span<const PosedWorld* const> worlds, double obstacle_speed, double obstacle_age,
