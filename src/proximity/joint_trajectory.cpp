@@ -94,7 +94,8 @@ std::vector<double> positions_at(const StraightPieces& pieces, double time) {
   return q;
 }
 
-double braking_way(const StraightPieces& pieces, double from, double until, double deceleration) {
+double braking_way(const StraightPieces& pieces, double from, double until,
+                   const std::vector<double>& decelerations) {
   double rate = kInfinity;  // [1/s] at which time can be slowed down
   for (std::size_t k = 0; k + 1 < pieces.times.size(); ++k) {
     if (pieces.times[k + 1] <= from || pieces.times[k] >= until) continue;
@@ -104,7 +105,7 @@ double braking_way(const StraightPieces& pieces, double from, double until, doub
       const double acceleration = 8.0 * pieces.deviations[k][j] / (span * span);
       const double change = std::abs(pieces.positions[k + 1][j] - pieces.positions[k][j]);
       const double speed = change / span + 0.5 * acceleration * span;
-      if (speed > 0.0) rate = std::min(rate, (deceleration - acceleration) / speed);
+      if (speed > 0.0) rate = std::min(rate, (decelerations[j] - acceleration) / speed);
     }
   }
   return rate > 0.0 ? 0.5 / rate : kInfinity;

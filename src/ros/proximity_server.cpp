@@ -83,8 +83,8 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
         private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1), kDrawnUnseen,
         buffer_);
   }
-  trajectory_watch_ = std::make_unique<TrajectoryWatch>(nh_, private_nh_, config_, sources_,
-                                                        buffer_, unknown_space_.get(), live);
+  trajectory_watch_ = std::make_unique<TrajectoryWatch>(
+      nh_, private_nh_, config_, sources_, buffer_, unknown_space_.get(), ignore_service_, live);
   query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live,
                                                   unknown_space_.get(), [this] {
                                                     publish_diagnostics_when_due();

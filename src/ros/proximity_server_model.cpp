@@ -65,10 +65,9 @@ void ProximityServer::Impl::take_model() {
 /// Decides which links count in ~min_distance and ~speed_scale, and tells it where it is new.
 void ProximityServer::Impl::choose_counted_links() {
   const CountedLinks before = std::move(counted_);
-  ServerConfig config = config_;
-  config.ignore_links.insert(config.ignore_links.end(), ignored_.begin(), ignored_.end());
-  counted_ = counted_links(*model_, config, root_stands_still_);
-  const CountedLinks self = counted_links(*with_paired(model_), config, root_stands_still_);
+  counted_ = counted_links(*model_, config_, ignored_, root_stands_still_);
+  const CountedLinks self =
+      counted_links(*with_paired(model_), config_, ignored_, root_stands_still_);
   summary_.set_links(counted_, self);
   marker_drawer_.set_counts(counted_.counts);
   std::string problem = self.problem;

@@ -149,7 +149,9 @@ TEST(TrajectoryClearance, brakingTakesWhatJointsCan) {
     const double deceleration = test::uniform(&rng, 2.0, 30.0);
     const double from = test::uniform(&rng, scene.path.times[0], scene.end());
     const double until = test::uniform(&rng, from, scene.end());
-    const double way = braking_way(straight_pieces(scene.path), from, until, deceleration);
+    const double way =
+        braking_way(straight_pieces(scene.path), from, until,
+                    std::vector<double>(arm.kinematics->joints().size(), deceleration));
     if (way == 0.0 || way > until - from) continue;
     ++braked;
     // Time runs at sqrt(1 - u) where a share u of the way is gone, from a begin on until it stands.

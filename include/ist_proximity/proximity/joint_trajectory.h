@@ -41,9 +41,11 @@ std::vector<double> positions_at(const StraightPieces& pieces, double time);
 
 /// [s] The most of the trajectory's time that braking along it takes, if it begins at `from` or
 /// later and ends by `until`; +inf where a joint's own acceleration exceeds the deceleration.
-/// Braking slows time down steadily, as fast as every joint can with `deceleration` [rad/s^2,
-/// m/s^2] beside what the trajectory asks of it: it takes twice this long. Thread safe.
-double braking_way(const StraightPieces& pieces, double from, double until, double deceleration);
+/// Braking slows time down steadily, as fast as every joint can beside what the trajectory asks of
+/// it: it takes twice this long. Thread safe.
+/// @param decelerations  [rad/s^2, m/s^2] by joint
+double braking_way(const StraightPieces& pieces, double from, double until,
+                   const std::vector<double>& decelerations);
 
 /// The proven clearance of a link along a trajectory.
 struct LinkClearance {

@@ -58,20 +58,21 @@ bool has_frame_outside(const ModelState& model, const ServerConfig& config) {
 }
 
 CountedLinks counted_links(const ModelState& model, const ServerConfig& config,
-                           bool root_stands_still) {
+                           const std::vector<std::string>& ignored, bool root_stands_still) {
   CountedLinks result;
   result.links = model.links;
   result.counts.assign(model.links.size(), true);
   if (!model.robot || model.monitored.size() != model.links.size()) return result;
-  const std::set<std::string> ignore(config.ignore_links.begin(), config.ignore_links.end());
+  std::set<std::string> ignore(config.ignore_links.begin(), config.ignore_links.end());
+  ignore.insert(ignored.begin(), ignored.end());
   result.problem = unknown_ignored(config.ignore_links, model.links);
 
   const std::vector<bool> moves = may_move(model, config, root_stands_still);
-  std::vector<std::string> ignored, fixed;
+  std::vector<std::string> left_out, fixed;
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     const bool is_ignored = ignore.count(model.links[i]) > 0;
     result.counts[i] = !is_ignored && (moves[i] || config.fixed_links_count);
-    if (is_ignored) ignored.push_back(quoted(model.links[i]));
+    if (is_ignored) left_out.push_back(quoted(model.links[i]));
     if (!is_ignored && !result.counts[i]) fixed.push_back(quoted(model.links[i]));
   }
   // A sensor on a post: nothing can move, and its distances are asked for all the same.
@@ -83,7 +84,7 @@ CountedLinks counted_links(const ModelState& model, const ServerConfig& config,
     }
     fixed.clear();
   }
-  result.explanation = explain(ignored, fixed);
+  result.explanation = explain(left_out, fixed);
   return result;
 }
 

@@ -20,10 +20,11 @@ struct CountedLinks {
 /// Decides which links count: not those in ~ignore_links, and not those that cannot move in the
 /// fixed frame, unless ~min_distance/fixed_links says so. A link of which that is not known counts.
 /// The fixed links count where no link can move, and none is left.
+/// @param ignored  names, beside those of ~ignore_links
 /// @param root_stands_still  whether tf states that the root link never moves in a fixed frame that
 ///                           the URDF lacks
 CountedLinks counted_links(const ModelState& model, const ServerConfig& config,
-                           bool root_stands_still);
+                           const std::vector<std::string>& ignored, bool root_stands_still);
 
 /// Whether the fixed frame is no link of the model's URDF, so that `root_stands_still` decides.
 bool has_frame_outside(const ModelState& model, const ServerConfig& config);

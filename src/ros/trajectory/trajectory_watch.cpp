@@ -10,6 +10,8 @@
 #include "ros/common/publish.h"
 #include "ros/common/stopwatch.h"
 #include "ros/common/text.h"
+#include "ros/model/counted_links.h"
+#include "ros/trajectory/trajectory_markers.h"
 
 namespace ist {
 namespace {
@@ -17,7 +19,8 @@ namespace {
 // An answer is given as often as this, and with every new cloud.
 constexpr std::chrono::milliseconds kPeriod(100);
 constexpr double kWakeUp = 0.01;  // [s]
-// [s] A goal is cancelled so much before braking is due, for the thread and the message.
+// [s] A goal is cancelled so much before braking is due, for the thread and the message, and by the
+// time that an answer takes.
 constexpr double kAhead = 0.02;
 // Positions of joints that are older than this are not known.
 constexpr std::chrono::milliseconds kStateTimeout(500);
@@ -28,18 +31,26 @@ ros::Time after(const ros::Time& start, double seconds) {
   return time > 0.0 ? ros::Time(time) : ros::Time();
 }
 
+// The trajectory says which links move, in whatever frame distances are.
+ServerConfig with_fixed_links(ServerConfig config) {
+  config.fixed_links_count = true;
+  return config;
+}
+
 }  // namespace
 
 TrajectoryWatch::TrajectoryWatch(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
                                  const ServerConfig& config, const CloudSources& sources,
                                  const TransformBuffer& buffer, UnknownSpaceWatch* watch,
-                                 std::function<LiveConfig()> live)
+                                 const IgnoreService& ignored, std::function<LiveConfig()> live)
     : nh_(nh),
       private_nh_(private_nh),
-      config_(config),
+      config_(with_fixed_links(config)),
+      ignored_(ignored),
       live_(std::move(live)),
       stated_(config, sources, buffer, watch) {
   publisher_ = private_nh_.advertise<Message>("trajectory_clearance", 10);
+  markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("trajectory_markers", 1);
   if (!config.trajectory.cancel_topic.empty()) {
     cancel_ = nh_.advertise<actionlib_msgs::GoalID>(config.trajectory.cancel_topic, 10);
   }
@@ -115,14 +126,16 @@ std::string TrajectoryWatch::take_trajectory() {
 
 // Compares the robot with the trajectory. @returns empty, or which joint is where
 std::string TrajectoryWatch::why_elsewhere(double time) const {
-  const std::vector<double> q = trajectory_.positions(time);
+  const std::vector<double> q = positions_at(trajectory_.pieces, time);
   for (const std::size_t joint : trajectory_.joints) {
-    const std::string& name = model_->kinematics->joints()[joint].name;
+    const Kinematics::Joint& one = model_->kinematics->joints()[joint];
+    const std::string& name = one.name;
     const double present = present_position(name);
     if (std::isnan(present)) {
       return "the position of joint '" + name + "' is not known: joint_states must hold it";
     }
-    if (std::abs(present - q[joint]) <= config_.trajectory.tolerance) continue;
+    const double off = distance_between(one, present, q[joint]);
+    if (std::abs(off) <= config_.trajectory.tolerance) continue;
     return format_text(
         "the robot does not follow the trajectory: joint '%s' is at %.3f and should be at %.3f, "
         "which is more than ~trajectory/tolerance (%g)",
@@ -168,32 +181,43 @@ void TrajectoryWatch::look(const ros::Time& now, Message* message) {
   if (!is_new && Clock::now() - last_look_ < kPeriod) return;
   clouds_.assign(clouds.begin(), clouds.end());
   if (!problem.empty()) return publish(message, Message::UNKNOWN, problem);
-  const double age =
-      here_.cloud_stamp.isZero() ? 0.0 : std::max((now - here_.cloud_stamp).toSec(), 0.0);
   std::vector<bool> wanted = stated_.measurable();
-  const std::vector<bool> moved = moved_links();
+  const std::vector<bool> moved = moved_links(now);
   for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = wanted[i] && moved[i];
   std::vector<LinkClearance> found;
   stated_.impacts(live.query)
       .run(trajectory_.pieces, time, stated_.poses().joints(), stated_.poses().X_FR(), wanted,
-           clouds, stated_.cycle().worlds(), config_.trajectory.obstacle_speed, age, &found);
-  fill(found, time, message);
-  message->computation_time = watch.lap();
+           clouds, stated_.cycle().worlds(), config_.trajectory.obstacle_speed,
+           obstacle_age(now, time), &found);
+  fill(found, moved, time, message);
+  message->computation_time = took_ = watch.lap();
   publish(message, message->state, message->text);
 }
 
+// [s] For how long obstacles may have come nearer than they were measured when the robot is where
+// the trajectory has it at `time`, now or once it begins: also while braking delays the robot.
+double TrajectoryWatch::obstacle_age(const ros::Time& now, double time) const {
+  const ros::Time measured = here_.cloud_stamp.isZero() ? now : here_.cloud_stamp;
+  const double age = std::max((std::max(now, trajectory_.start) - measured).toSec(), 0.0);
+  const double way = config_.deceleration.is_stated()
+                         ? braking_way(trajectory_.pieces, time, trajectory_.end(),
+                                       config_.deceleration.of(*model_->kinematics))
+                         : 0.0;
+  return age + (std::isfinite(way) ? way : 0.0);  // nothing helps where it cannot brake
+}
+
 // By link of the robot: whether it counts, and the trajectory moves it.
-std::vector<bool> TrajectoryWatch::moved_links() const {
+std::vector<bool> TrajectoryWatch::moved_links(const ros::Time& now) const {
   const RobotModel& robot = *model_->robot;
   const Kinematics& kinematics = *model_->kinematics;
   const std::vector<std::size_t>& moved = trajectory_.joints;
   std::vector<bool> links(robot.links.size(), false);
-  for (const std::size_t link : model_->monitored) {
-    const std::string& name = robot.links[link].name;
-    const std::vector<std::string>& ignored = config_.ignore_links;
-    if (std::find(ignored.begin(), ignored.end(), name) != ignored.end()) continue;
-    const auto body = kinematics.find_body(name);
-    if (!body) continue;
+  const std::vector<bool> counts =
+      counted_links(*model_, config_, ignored_.names(now), true).counts;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const std::size_t link = model_->monitored[i];
+    const auto body = kinematics.find_body(robot.links[link].name);
+    if (!counts[i] || !body) continue;
     for (std::size_t at = *body; at != 0; at = kinematics.joints()[at - 1].parent) {
       const std::size_t source = kinematics.joints()[at - 1].source;
       if (std::find(moved.begin(), moved.end(), source) != moved.end() ||
@@ -206,8 +230,8 @@ std::vector<bool> TrajectoryWatch::moved_links() const {
 }
 
 // @param now  [s] of the trajectory
-void TrajectoryWatch::fill(const std::vector<LinkClearance>& found, double now, Message* message) {
-  const std::vector<bool> moved = moved_links();
+void TrajectoryWatch::fill(const std::vector<LinkClearance>& found, const std::vector<bool>& moved,
+                           double now, Message* message) {
   double contact = kInfinity;
   std::size_t first = 0;
   std::string unknown;
@@ -249,9 +273,9 @@ void TrajectoryWatch::fill_contact(std::size_t link, double contact, double now,
   message->text = format_text("link '%s' may touch an obstacle in %.2f s",
                               model_->links[link].c_str(), message->time_to_contact);
   if (config_.deceleration.is_stated()) {
-    const double brake =
-        trajectory_.latest_brake(now, contact, config_.deceleration.of(*model_->kinematics));
-    message->brake = after(trajectory_.start, brake);
+    const double way =
+        braking_way(trajectory_.pieces, now, contact, config_.deceleration.of(*model_->kinematics));
+    message->brake = after(trajectory_.start, std::max(now, contact - way));
     message->text +=
         format_text("; braking is due in %.2f s", (message->brake - message->header.stamp).toSec());
   }
@@ -259,9 +283,17 @@ void TrajectoryWatch::fill_contact(std::size_t link, double contact, double now,
   live.query.deadline = 0.0;
   ist_proximity::ProximityArray there;
   const auto state = trajectory_.state(*model_->kinematics, contact);
-  if (stated_.run(state, live, &there).empty() && link < there.links.size()) {
-    message->first = there.links[link];
-  }
+  if (!stated_.run(state, live, &there).empty() || link >= there.links.size()) return;
+  message->first = there.links[link];
+  draw(*message);
+}
+
+// Draws the robot where it was measured last.
+void TrajectoryWatch::draw(const Message& message) {
+  if (markers_.getNumSubscribers() == 0) return;
+  BodyPoses bodies;
+  stated_.poses().look_up_all(*model_->kinematics, message.contact, &bodies);
+  publish_message(markers_, trajectory_markers(message, *model_, bodies));
 }
 
 void TrajectoryWatch::publish(Message* message, std::uint8_t state, const std::string& text) {
@@ -282,7 +314,7 @@ void TrajectoryWatch::publish(Message* message, std::uint8_t state, const std::s
 
 void TrajectoryWatch::cancel_when_due(const ros::Time& now) {
   if (!cancel_ || !is_watching_) return;
-  const bool is_due = !brake_.isZero() && now + ros::Duration(kAhead) >= brake_;
+  const bool is_due = !brake_.isZero() && now + ros::Duration(kAhead + took_) >= brake_;
   // The first joint states are still on their way.
   const bool is_starting = Clock::now() - listening_since_ < kStateTimeout;
   if (!is_due && (!is_unknown_ || is_starting)) return;

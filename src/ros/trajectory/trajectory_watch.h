@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "ros/parameters/parameters.h"
+#include "ros/services/ignore_service.h"
 #include "ros/services/stated_cycle.h"
 #include "ros/trajectory/watched_trajectory.h"
 
@@ -25,17 +26,20 @@ namespace ist {
 ///
 /// A message without points ends the watch. One that cannot be watched ends it too, and is told as
 /// UNKNOWN until another one comes: what is running then is not known. So is a robot that is not
-/// where the trajectory has it. Links that the trajectory does not move, and ~ignore_links, do not
-/// count. All but set_model() is called by the thread of one callback queue.
+/// where the trajectory has it. Links that the trajectory does not move do not count, nor those
+/// that ~ignore_links leaves out of ~min_distance. While somebody listens to ~trajectory_markers,
+/// the robot is drawn where it touches. All but set_model() is called by the thread of one callback
+/// queue.
 class TrajectoryWatch {
  public:
   /// @param sources, buffer  outlive this
   /// @param watch            outlives this; null with ~unknown_space free
+  /// @param ignored          outlives this
   /// @param live             gives the present configuration
   TrajectoryWatch(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
                   const ServerConfig& config, const CloudSources& sources,
                   const TransformBuffer& buffer, UnknownSpaceWatch* watch,
-                  std::function<LiveConfig()> live);
+                  const IgnoreService& ignored, std::function<LiveConfig()> live);
 
   /// Begins to receive messages by a queue, which outlives this; its thread ends first.
   void subscribe(ros::CallbackQueue* queue);
@@ -60,17 +64,21 @@ class TrajectoryWatch {
   std::string take_trajectory();
   std::string why_elsewhere(double time) const;
   void look(const ros::Time& now, Message* message);
-  void fill(const std::vector<LinkClearance>& found, double now, Message* message);
+  double obstacle_age(const ros::Time& now, double time) const;
+  void fill(const std::vector<LinkClearance>& found, const std::vector<bool>& moved, double now,
+            Message* message);
   void fill_contact(std::size_t link, double contact, double now, Message* message);
-  std::vector<bool> moved_links() const;
+  std::vector<bool> moved_links(const ros::Time& now) const;
+  void draw(const Message& message);
   void publish(Message* message, std::uint8_t state, const std::string& text);
   void cancel_when_due(const ros::Time& now);
 
   ros::NodeHandle nh_, private_nh_;
   const ServerConfig config_;
+  const IgnoreService& ignored_;
   const std::function<LiveConfig()> live_;
   StatedCycle stated_;
-  ros::Publisher publisher_, cancel_;
+  ros::Publisher publisher_, markers_, cancel_;
   ros::Subscriber trajectories_, states_;
   ros::WallTimer timer_;  ///< wakes the thread while a trajectory is watched
 
@@ -85,6 +93,7 @@ class TrajectoryWatch {
   std::vector<const CloudSnapshot*> clouds_;  ///< those of the last answer
   Clock::time_point last_look_, listening_since_;
   ros::Time brake_;          ///< zero: not needed
+  double took_ = 0.0;        ///< [s] the last answer
   bool is_unknown_ = false;  ///< what the last answer said
 };
 

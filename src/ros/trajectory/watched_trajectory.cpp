@@ -1,10 +1,9 @@
 #include "ros/trajectory/watched_trajectory.h"
 
-#include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <set>
 
+#include "internal/geometry/limits.h"
 #include "internal/geometry/numbers.h"
 #include "ros/common/text.h"
 
@@ -14,6 +13,7 @@ namespace {
 using Message = trajectory_msgs::JointTrajectory;
 
 constexpr std::size_t kMaxPoints = 10000;  // an hour of points, or more
+constexpr std::size_t kMaxPieces = 10000;  // half a second for an answer, or less
 constexpr double kMaxTime = 1e5;           // [s]
 constexpr double kMaxPosition = 1e4;       // [rad, m]
 
@@ -23,9 +23,9 @@ std::string find_joints(const Message& message, const Kinematics& kinematics,
   if (message.joint_names.empty()) return "it names no joints";
   std::set<std::string> names;
   for (const std::string& name : message.joint_names) {
-    if (!names.insert(name).second) return "it names joint '" + name + "' twice";
+    if (!names.insert(name).second) return "it names joint '" + printable(name) + "' twice";
     const auto found = kinematics.find_joint(name);
-    if (!found) return "the robot has no joint '" + name + "'";
+    if (!found) return "the robot has no joint '" + printable(name) + "'";
     if (kinematics.joints()[*found].type == JointType::kFixed ||
         kinematics.joints()[*found].has_unstated_pose()) {
       return "joint '" + name + "' has no position of its own";
@@ -90,20 +90,9 @@ std::vector<double> by_joint(const std::vector<double>& numbers,
 
 }  // namespace
 
-std::vector<double> WatchedTrajectory::positions(double time) const {
-  const auto after = std::upper_bound(pieces.times.begin(), pieces.times.end(), time);
-  if (after == pieces.times.begin()) return pieces.positions.front();
-  if (after == pieces.times.end()) return pieces.positions.back();
-  const auto k = static_cast<std::size_t>(std::distance(pieces.times.begin(), after));
-  const double s = (time - pieces.times[k - 1]) / (pieces.times[k] - pieces.times[k - 1]);
-  std::vector<double> q = pieces.positions[k - 1];
-  for (std::size_t j = 0; j < q.size(); ++j) q[j] += s * (pieces.positions[k][j] - q[j]);
-  return q;
-}
-
 sensor_msgs::JointState WatchedTrajectory::state(const Kinematics& kinematics, double time) const {
   sensor_msgs::JointState message;
-  const std::vector<double> q = positions(time);
+  const std::vector<double> q = positions_at(pieces, time);
   for (const std::size_t joint : joints) {
     message.name.push_back(kinematics.joints()[joint].name);
     message.position.push_back(q[joint]);
@@ -111,22 +100,9 @@ sensor_msgs::JointState WatchedTrajectory::state(const Kinematics& kinematics, d
   return message;
 }
 
-double WatchedTrajectory::latest_brake(double from, double contact,
-                                       const std::vector<double>& decelerations) const {
-  double rate = kInfinity;  // [1/s] at which time can be slowed down
-  for (std::size_t k = 0; k + 1 < pieces.times.size(); ++k) {
-    if (pieces.times[k + 1] <= from || pieces.times[k] >= contact) continue;
-    const double span = pieces.times[k + 1] - pieces.times[k];
-    for (const std::size_t joint : joints) {
-      // A polynomial is this far from its chord where its second derivative is that of the bound.
-      const double acceleration = 8.0 * pieces.deviations[k][joint] / (span * span);
-      const double change = std::abs(pieces.positions[k + 1][joint] - pieces.positions[k][joint]);
-      const double speed = change / span + 0.5 * acceleration * span;
-      if (speed > 0.0) rate = std::min(rate, (decelerations[joint] - acceleration) / speed);
-    }
-  }
-  if (!(rate > 0.0)) return from;
-  return std::max(from, contact - 0.5 / rate);
+double distance_between(const Kinematics::Joint& joint, double present, double q) {
+  const double way = present - q;
+  return joint.type == JointType::kContinuous ? std::remainder(way, 2.0 * M_PI) : way;
 }
 
 std::string read_trajectory(const Message& message, const Kinematics& kinematics,
@@ -136,13 +112,20 @@ std::string read_trajectory(const Message& message, const Kinematics& kinematics
   std::string fault = find_joints(message, kinematics, &joints);
   if (fault.empty()) fault = check_points(message);
   if (!fault.empty()) return fault;
+  const ros::Time start = message.header.stamp.isZero() ? received : message.header.stamp;
+  if (start.toSec() > received.toSec() + kMaxTime) {
+    return format_text("it begins in %g s, which is more than a day",
+                       start.toSec() - received.toSec());
+  }
   const std::size_t count = kinematics.joints().size();
   JointTrajectory path;
   const auto& first = message.points.front();
   if (first.time_from_start.toSec() > 0.0) {
     std::vector<double> q;
-    for (const std::string& name : message.joint_names) {
-      q.push_back(present(name));
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      const std::string& name = message.joint_names[j];
+      const double to = first.positions[j];
+      q.push_back(to + distance_between(kinematics.joints()[joints[j]], present(name), to));
       if (std::isnan(q.back())) {
         return "its first point is not at time 0, and the position of joint '" + name +
                "' is not known";
@@ -165,10 +148,12 @@ std::string read_trajectory(const Message& message, const Kinematics& kinematics
     }
   }
   if (path.velocities.empty()) path.accelerations.clear();
-  trajectory->start = message.header.stamp.isZero() ? received : message.header.stamp;
+  trajectory->start = start;
   trajectory->joints = std::move(joints);
   trajectory->pieces = straight_pieces(path);
-  return "";
+  if (trajectory->pieces.times.size() <= kMaxPieces) return "";
+  return format_text("it turns too often: %zu straight pieces are near it, more than %zu",
+                     trajectory->pieces.times.size(), kMaxPieces);
 }
 
 }  // namespace ist

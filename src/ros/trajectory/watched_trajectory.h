@@ -23,19 +23,16 @@ struct WatchedTrajectory {
   StraightPieces pieces;
 
   double end() const { return pieces.times.back(); }  ///< [s]
-  /// [rad, m] By joint of the kinematics, at a time [s]; NaN for joints that it does not move.
-  std::vector<double> positions(double time) const;
-  /// The same, of the joints that it moves, as a message.
+  /// Where it has the joints that it moves at a time [s].
   sensor_msgs::JointState state(const Kinematics& kinematics, double time) const;
-  /// [s] The latest time at which braking along the trajectory still ends before `contact`; `from`
-  /// where that is past. Braking slows time down steadily, as fast as every joint can with its
-  /// deceleration [rad/s^2, m/s^2] beside what the trajectory asks of it.
-  /// @param decelerations  by joint of the kinematics
-  double latest_brake(double from, double contact, const std::vector<double>& decelerations) const;
 };
 
+/// [rad, m] How far a joint at `present` is from `q`; of a continuous one without whole turns.
+double distance_between(const Kinematics::Joint& joint, double present, double q);
+
 /// Reads a message with one point or more. Where its first point is not at time 0, the trajectory
-/// begins at the joints' present positions, as controllers do.
+/// begins at the joints' present positions, as controllers do: they leave out whole turns of
+/// continuous joints.
 /// @param received  its start, where its stamp is 0
 /// @returns empty, or a sentence: why it cannot be watched
 std::string read_trajectory(const trajectory_msgs::JointTrajectory& message,
