@@ -231,7 +231,8 @@ class TrajectoryTest(unittest.TestCase):
         speed, wait, deceleration = 0.1, 3.0, 0.4
         self.start(
             query={"max_distance": 3.0},
-            trajectory={"obstacle_speed": speed, "deceleration": deceleration, "tolerance": 1.0},
+            joint_deceleration=deceleration,
+            trajectory={"obstacle_speed": speed, "tolerance": 1.0},
         )
         start = rospy.Time.now() + rospy.Duration(wait)
         self.sender.publish(trajectory([(0.0, 0.0), (DURATION, FAR)], start))
