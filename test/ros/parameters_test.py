@@ -79,7 +79,7 @@ WRONG = [
         [
             '~sources/scan/max_range is "far"',
             "~sources/map/self_filter is set: it is not for a source of type octomap_msgs/Octomap",
-            "~sources/map/timeout is 0 s: allowed is more than 0, inf included",
+            "~sources/map/timeout is 0 s: allowed is more than 0 s, inf included",
             '~sources/file/file is "room.bt": an absolute path is needed',
             "~sources/file/topic and ~sources/file/file are both set",
             "~sources/odd/type",
@@ -172,7 +172,7 @@ WRONG = [
         },
         [
             "~memory/enabled",
-            "~memory/decay is -1 s: allowed is more than 0, inf included",
+            "~memory/decay is -1 s: allowed is more than 0 s, inf included",
             "~memory/resolution is 0 m: allowed is from 0.001 to 1 m",
             "~memory/max_nodes",
             '~memory/file is "memory.bt": an absolute path is needed',

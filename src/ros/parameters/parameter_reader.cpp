@@ -198,13 +198,11 @@ bool Range::contains(double value) const {
 
 std::string Range::text() const {
   std::string text = (min_excluded ? "more than " : "from ") + number_text(min);
-  if (std::isinf(max)) {
-    text += infinite ? ", inf included" : min_excluded ? ", finite" : " up, finite";
-  } else {
-    text += " to " + number_text(max);
-    if (infinite) text += ", or inf";
+  if (!std::isinf(max)) {
+    return with_unit(text + " to " + number_text(max) + (infinite ? ", or inf" : ""), *this);
   }
-  return with_unit(text, *this);
+  if (!min_excluded) text += " up";
+  return with_unit(text, *this) + (infinite ? ", inf included" : ", finite");
 }
 
 double Parameter::number() const {
