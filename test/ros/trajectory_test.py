@@ -84,9 +84,9 @@ class TrajectoryTest(unittest.TestCase):
         time_now = (rospy.Time.now() - self.start_time).to_sec()
         return FAR * min(max(time_now / DURATION, 0.0), 1.0) + self.at_rest
 
-    def start(self, **parameters):
+    def start(self, urdf=ARM, **parameters):
         parameters.update(pose_source="joint_states", self_filter=False)
-        self.node = pt.ProximityNode(self.namespace, parameters, ARM)
+        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
         self.node.subscribe("trajectory_clearance", TrajectoryClearance, self.hear)
         cancel = self.namespace + "/arm/cancel"
         self.subscriber = rospy.Subscriber(
@@ -226,6 +226,23 @@ class TrajectoryTest(unittest.TestCase):
             self.assertTrue(remove("target").success)
             self.node.wait_for(lambda m: not m.zones, "no zone")
             self.wait(is_contact, "the point again")
+
+    def test_what_is_carried_touches_links_that_stand(self):
+        post = """<link name="post"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>
+            <joint name="to_post" type="fixed"><parent link="base"/><child link="post"/>
+            <origin xyz="1 0 0.5"/></joint></robot>"""
+        tool = {"shape": "box", "size": [0.1, 0.1, 0.1], "position": [0.3, 0, 0], "frame_id": "ball_link"}
+        self.start(
+            ARM.replace("</robot>", post),
+            sources={"held": {"type": "world", "objects": {"tool": tool}}},
+            trajectory={"tolerance": 1.0},
+        )
+        self.send()
+        told = self.wait(lambda m: m.state == m.CONTACT, "the tool at the post", 0)
+        self.assertEqual(told.first.link, "post")
+        touch = DURATION * 0.6 / FAR
+        contact = (told.contact - told.start).to_sec()
+        self.assertTrue(touch - 0.02 < contact <= touch, contact)
 
     def test_obstacles_come_while_the_robot_waits_and_brakes(self):
         speed, wait, deceleration = 0.1, 3.0, 0.4

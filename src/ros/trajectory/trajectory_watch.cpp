@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "internal/geometry/numbers.h"
+#include "internal/proximity/carried_worlds.h"
 #include "ros/common/publish.h"
 #include "ros/common/stopwatch.h"
 #include "ros/common/text.h"
@@ -206,25 +207,34 @@ double TrajectoryWatch::obstacle_age(const ros::Time& now, double time) const {
   return age + (std::isfinite(way) ? way : 0.0);  // nothing helps where it cannot brake
 }
 
-// By link of the robot: whether it counts, and the trajectory moves it.
+// By link of the robot: whether it counts, and the trajectory moves it, or an object that the robot
+// carries towards it.
 std::vector<bool> TrajectoryWatch::moved_links(const ros::Time& now) const {
   const RobotModel& robot = *model_->robot;
   const Kinematics& kinematics = *model_->kinematics;
   const std::vector<std::size_t>& moved = trajectory_.joints;
+  const auto is_moved = [&](std::size_t body) {
+    for (; body != 0; body = kinematics.joints()[body - 1].parent) {
+      const std::size_t source = kinematics.joints()[body - 1].source;
+      if (std::find(moved.begin(), moved.end(), source) != moved.end() ||
+          std::find(moved.begin(), moved.end(), body - 1) != moved.end()) {
+        return true;
+      }
+    }
+    return false;
+  };
+  CarriedWorlds carried;
+  carried.take(stated_.cycle().worlds(), kinematics);
+  const bool moves_object =
+      std::any_of(carried.frames().begin(), carried.frames().end(),
+                  [&](const CarriedWorlds::Frame& frame) { return is_moved(frame.body); });
   std::vector<bool> links(robot.links.size(), false);
   const std::vector<bool> counts =
       counted_links(*model_, config_, ignored_.names(now), true).counts;
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const std::size_t link = model_->monitored[i];
     const auto body = kinematics.find_body(robot.links[link].name);
-    if (!counts[i] || !body) continue;
-    for (std::size_t at = *body; at != 0; at = kinematics.joints()[at - 1].parent) {
-      const std::size_t source = kinematics.joints()[at - 1].source;
-      if (std::find(moved.begin(), moved.end(), source) != moved.end() ||
-          std::find(moved.begin(), moved.end(), at - 1) != moved.end()) {
-        links[link] = true;
-      }
-    }
+    links[link] = counts[i] && body && (moves_object || is_moved(*body));
   }
   return links;
 }

@@ -26,10 +26,10 @@ namespace ist {
 ///
 /// A message without points ends the watch. One that cannot be watched ends it too, and is told as
 /// UNKNOWN until another one comes: what is running then is not known. So is a robot that is not
-/// where the trajectory has it. Links that the trajectory does not move do not count, nor those
-/// that ~ignore_links leaves out of ~min_distance. While somebody listens to ~trajectory_markers,
-/// the robot is drawn where it touches. All but set_model() is called by the thread of one callback
-/// queue.
+/// where the trajectory has it. Links that the trajectory does not move do not count while it moves
+/// no known object, nor those that ~ignore_links leaves out of ~min_distance. While somebody
+/// listens to ~trajectory_markers, the robot is drawn where it touches. All but set_model() is
+/// called by the thread of one callback queue.
 class TrajectoryWatch {
  public:
   /// @param sources, buffer  outlive this
