@@ -91,15 +91,32 @@ Scene random_scene(test::Rng* rng, const test::Arm& arm) {
   return scene;
 }
 
+// Where a trajectory is begun, and how obstacles come nearer.
+struct Watch {
+  double from, speed, age;  // [s], [m/s], [s]
+
+  double come(double time) const { return speed * (time - from + age); }
+};
+
+// From a time within the trajectory in one of three, with obstacles that come in one of two.
+Watch random_watch(test::Rng* rng, const Scene& scene) {
+  Watch watch{scene.path.times[0], 0.0, 0.0};
+  if (test::uniform(rng, 0, 1) < 0.3) watch.from = test::uniform(rng, watch.from, scene.end());
+  if (test::uniform(rng, 0, 1) < 0.5) return watch;
+  watch.speed = test::uniform(rng, 0.0, test::uniform(rng, 0.0, 3.0));
+  watch.age = test::uniform(rng, 0.0, 0.2);
+  return watch;
+}
+
 struct Sampled {
   double contact = kInf, least = kInf;  // [s], [m] until then
 };
 
-Sampled sample(const test::Arm& arm, const Scene& scene, double from) {
+Sampled sample(const test::Arm& arm, const Scene& scene, const Watch& watch) {
   constexpr double kStep = 5e-4, kFastest = 40.0;
   Sampled sampled;
-  for (double time = from; time <= scene.end();) {
-    const double distance = test::sampled_distance(arm, scene.at(time), 0.5);
+  for (double time = watch.from; time <= scene.end();) {
+    const double distance = test::sampled_distance(arm, scene.at(time), 0.5) - watch.come(time);
     sampled.least = std::min(sampled.least, distance);
     if (distance <= 0.0) {
       sampled.contact = time;
@@ -182,21 +199,24 @@ TEST(TrajectoryClearance, brakingTakesWhatJointsCan) {
 
 TEST(TrajectoryClearance, neverLateAndHardlyEarly) {
   test::Rng rng(6);
+  constexpr double kFar = 3.0;  // [m]
   int trajectories = 0, contacts = 0, close = 0, tight = 0, free = 0;
   while (trajectories < test::scaled(1000)) {
     const test::Arm arm = test::random_arm(&rng);
     QueryConfig config;
-    config.max_distance = 0.5;
+    config.max_distance = kFar;
     TimeOfImpact impacts(arm.model, arm.kinematics, config);
     for (int i = 0; i < 20; ++i) {
       const Scene scene = random_scene(&rng, arm);
-      const bool is_begun = test::uniform(&rng, 0, 1) < 0.3;
-      const double from =
-          is_begun ? test::uniform(&rng, scene.path.times[0], scene.end()) : scene.path.times[0];
+      const Watch watch = random_watch(&rng, scene);
+      const auto distance = [&](double time) {
+        return test::sampled_distance(arm, scene.at(time), 0.5) - watch.come(time);
+      };
       const CloudSnapshot cloud = test::make_snapshot(scene.motion.points);
       std::vector<LinkClearance> found;
-      impacts.run(straight_pieces(scene.path), from, scene.motion.still, scene.motion.X_FR,
-                  std::vector<bool>(arm.size(), true), {&cloud}, {}, 0.0, 0.0, &found);
+      impacts.run(straight_pieces(scene.path), watch.from, scene.motion.still, scene.motion.X_FR,
+                  std::vector<bool>(arm.size(), true), {&cloud}, {}, watch.speed, watch.age,
+                  &found);
       LinkClearance all;
       all.contact_time = kInf;
       double earliest = kInf;
@@ -205,33 +225,31 @@ TEST(TrajectoryClearance, neverLateAndHardlyEarly) {
         all.contact_time = std::min(all.contact_time, one.contact_time);
         all.lower_bound = std::fmin(all.lower_bound, one.lower_bound);
       }
-      const Sampled truth = sample(arm, scene, from);
+      const Sampled truth = sample(arm, scene, watch);
       // Pieces that are far from the polynomials are early, and not wrong.
       std::vector<LinkClearance> coarse;
-      impacts.run(straight_pieces(scene.path, 0.1), from, scene.motion.still, scene.motion.X_FR,
-                  std::vector<bool>(arm.size(), true), {&cloud}, {}, 0.0, 0.0, &coarse);
+      impacts.run(straight_pieces(scene.path, 0.1), watch.from, scene.motion.still,
+                  scene.motion.X_FR, std::vector<bool>(arm.size(), true), {&cloud}, {}, watch.speed,
+                  watch.age, &coarse);
       for (const LinkClearance& one : coarse) {
         earliest = std::min(earliest, one.contact_time);
       }
       ASSERT_LE(earliest, truth.contact) << "late";
       ASSERT_LE(all.contact_time, truth.contact) << "late";
       const double until =
-          all.contact_time < kInf
-              ? std::max(test::sampled_distance(arm, scene.at(all.contact_time), 0.5), 0.0)
-              : truth.least;
+          all.contact_time < kInf ? std::max(distance(all.contact_time), 0.0) : truth.least;
       ASSERT_LE(all.lower_bound, until + 1e-9) << "too far";
       ++trajectories;
       if (truth.contact < kInf) {
         ++contacts;
         const bool is_in_time = truth.contact - all.contact_time <= 0.02;
-        const bool is_near = test::sampled_distance(arm, scene.at(all.contact_time), 0.5) <= 0.005;
+        const bool is_near = distance(all.contact_time) <= 0.005;
         close += is_in_time || is_near ? 1 : 0;
       } else {
         ++free;
-        const bool is_near = all.contact_time < kInf &&
-                             test::sampled_distance(arm, scene.at(all.contact_time), 0.5) <= 0.005;
+        const bool is_near = all.contact_time < kInf && distance(all.contact_time) <= 0.005;
         close += all.contact_time == kInf || is_near ? 1 : 0;
-        const double least = std::min(truth.least, 0.5);
+        const double least = std::min(truth.least, kFar);
         tight += all.lower_bound >= std::min(0.75 * least, least - 0.002) - 0.012 ? 1 : 0;
       }
     }
