@@ -93,6 +93,7 @@ TEST(Octomap, DepthAndRegionAreChosen) {
 TEST(Octomap, AMapIsPlacedByItsPose) {
   octomap::OcTree tree(0.1);
   tree.updateNode(octomap::point3d(0.05F, 0.05F, 0.05F), true);
+  tree.updateNode(octomap::point3d(-0.05F, 0.05F, 0.05F), false);  // free, and nearer
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();
   X_FM.translation() << 1.8, 0.15, 0.05;  // its lower corner; the ball ends at x = 1.55
   EXPECT_NEAR(distance(to_obstacles(tree, X_FM)), 0.25, 1e-6);
