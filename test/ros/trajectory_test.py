@@ -73,7 +73,7 @@ class TrajectoryTest(unittest.TestCase):
         self.heard, self.cancelled = [], []
         self.condition = threading.Condition()
         self.start_time = rospy.Time.now() + rospy.Duration(1e6)
-        self.at_rest = self.turn = 0.0
+        self.at_rest = self.turn = self.speed = 0.0
 
     def tearDown(self):
         self.world.stop()
@@ -83,6 +83,11 @@ class TrajectoryTest(unittest.TestCase):
         """Where the robot is: it follows its trajectory."""
         time_now = (rospy.Time.now() - self.start_time).to_sec()
         return FAR * min(max(time_now / DURATION, 0.0), 1.0) + self.at_rest
+
+    def joint_state(self):
+        message = joint_state({"turn": self.turn, "slide": self.slide()})
+        message.velocity = [self.speed] * len(message.name)
+        return message
 
     def start(self, urdf=ARM, **parameters):
         parameters.update(pose_source="joint_states", self_filter=False)
@@ -94,9 +99,7 @@ class TrajectoryTest(unittest.TestCase):
         )
         self.sender = rospy.Publisher(self.node.name + "/trajectory", JointTrajectory, queue_size=1)
         joints = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
-        self.world.repeat(
-            100, lambda: joints.publish(joint_state({"turn": self.turn, "slide": self.slide()}))
-        )
+        self.world.repeat(100, lambda: joints.publish(self.joint_state()))
         publisher = self.world.cloud_publisher
         self.world.repeat(20, lambda: publisher.publish(pt.cloud(self.points, "base")))
         self.node.wait_for_status(0)
@@ -294,6 +297,7 @@ class TrajectoryTest(unittest.TestCase):
             (trajectory([(0, 0.1), (1, 1e300)], soon), "among the positions"),
             (trajectory([(1, 0.1), (1, 0.2)], soon), "does not rise"),
             (trajectory([(2, 0.1), (1, 0.2)], soon), "does not rise"),
+            (trajectory([(1, 0.1), (1 - 1e-9, 0.2)], soon), "does not rise"),
             (trajectory([(0, 0.1), (1e6, 0.2)], soon), "more than a day"),
             (trajectory([(0, 0.1), (1, 0.2)], soon, velocities=[[0.1], []]), "the other way round"),
             (trajectory([(0, 0.1), (1, 0.2)], soon, velocities=[[0.1], [nan]]), "velocities"),
@@ -341,6 +345,21 @@ class TrajectoryTest(unittest.TestCase):
         told = self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
         contact = (told.contact - told.start).to_sec()
         self.assertTrue(TOUCH - 0.02 < contact <= TOUCH, contact)
+        # With velocities it goes on as fast as it moves now.
+        for self.speed, touch in ((0.0, self.touch_of_cubic(0.0)), (0.4, self.touch_of_cubic(0.4))):
+            rospy.sleep(0.2)
+            sent = rospy.Time.now()
+            self.sender.publish(trajectory([(DURATION, FAR)], rospy.Time(), velocities=[[0.0]]))
+            told = self.wait(lambda m, sent=sent: m.state == m.CONTACT and m.start >= sent, "a contact")
+            contact = (told.contact - told.start).to_sec()
+            self.assertTrue(touch - 0.02 < contact <= touch, (contact, touch))
+
+    def touch_of_cubic(self, speed):
+        """When the slide touches that begins at 0 with this speed and stands at its end."""
+        t = np.linspace(0.0, DURATION, 100001)
+        u = t / DURATION
+        path = DURATION * speed * (u**3 - 2 * u**2 + u) + FAR * (3 * u**2 - 2 * u**3)
+        return t[np.argmax(path >= POINT - pt.BALL_RADIUS)]
 
     def test_whole_turns_do_not_count(self):
         """The column has turned three times; controllers do not turn it back."""

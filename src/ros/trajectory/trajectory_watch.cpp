@@ -63,9 +63,9 @@ void TrajectoryWatch::subscribe(ros::CallbackQueue* queue) {
   trajectories_ = private_nh_.subscribe("trajectory", 10, &TrajectoryWatch::receive, this);
 }
 
-void TrajectoryWatch::receive(const trajectory_msgs::JointTrajectoryConstPtr& message) {
-  received_ = message;
-  received_time_ = ros::Time::now();
+void TrajectoryWatch::receive(const Event& event) {
+  received_ = event.getConstMessage();
+  received_time_ = event.getReceiptTime();  // before it waited for this thread
   is_watching_ = true;
   last_look_ = Clock::time_point();
   if (states_) return timer_.start();
@@ -81,15 +81,16 @@ void TrajectoryWatch::receive_state(const sensor_msgs::JointStateConstPtr& messa
   if (positions_.size() + count > kMaxJoints) positions_.clear();
   for (std::size_t i = 0; i < count; ++i) {
     if (!std::isfinite(message->position[i])) continue;
-    positions_[message->name[i]] = {message->position[i], Clock::now()};
+    const double speed = i < message->velocity.size() ? message->velocity[i] : kNaN;
+    positions_[message->name[i]] = {{message->position[i], speed}, Clock::now()};
   }
 }
 
-double TrajectoryWatch::present_position(const std::string& joint) const {
+JointMotionNow TrajectoryWatch::present(const std::string& joint) const {
   const auto found = positions_.find(joint);
   const bool is_known =
       found != positions_.end() && Clock::now() - found->second.received <= kStateTimeout;
-  return is_known ? found->second.q : kNaN;
+  return is_known ? found->second.motion : JointMotionNow{kNaN, kNaN};
 }
 
 // Reads the newest message. @returns empty, or why nothing can be watched now
@@ -110,8 +111,7 @@ std::string TrajectoryWatch::take_trajectory() {
     trajectory_ = WatchedTrajectory();
     refusal_ = read_trajectory(
         *received_, *stated_.model()->kinematics,
-        [this](const std::string& joint) { return present_position(joint); }, received_time_,
-        &trajectory_);
+        [this](const std::string& joint) { return present(joint); }, received_time_, &trajectory_);
     received_.reset();
     model_ = stated_.model();
     if (!refusal_.empty()) {
@@ -131,16 +131,16 @@ std::string TrajectoryWatch::why_elsewhere(double time) const {
   for (const std::size_t joint : trajectory_.joints) {
     const Kinematics::Joint& one = model_->kinematics->joints()[joint];
     const std::string& name = one.name;
-    const double present = present_position(name);
-    if (std::isnan(present)) {
+    const double q_now = present(name).q;
+    if (std::isnan(q_now)) {
       return "the position of joint '" + name + "' is not known: joint_states must hold it";
     }
-    const double off = distance_between(one, present, q[joint]);
+    const double off = distance_between(one, q_now, q[joint]);
     if (std::abs(off) <= config_.trajectory.tolerance) continue;
     return format_text(
         "the robot does not follow the trajectory: joint '%s' is at %.3f and should be at %.3f, "
         "which is more than ~trajectory/tolerance (%g)",
-        name.c_str(), present, q[joint], config_.trajectory.tolerance);
+        name.c_str(), q_now, q[joint], config_.trajectory.tolerance);
   }
   return "";
 }

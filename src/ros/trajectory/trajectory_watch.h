@@ -2,6 +2,7 @@
 
 #include <ist_proximity/TrajectoryClearance.h>
 #include <ros/callback_queue.h>
+#include <ros/message_event.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/JointState.h>
 #include <trajectory_msgs/JointTrajectory.h>
@@ -53,14 +54,15 @@ class TrajectoryWatch {
  private:
   using Clock = std::chrono::steady_clock;
   using Message = ist_proximity::TrajectoryClearance;
+  using Event = ros::MessageEvent<const trajectory_msgs::JointTrajectory>;
   struct Position {
-    double q;  ///< [rad, m]
+    JointMotionNow motion;
     Clock::time_point received;
   };
 
-  void receive(const trajectory_msgs::JointTrajectoryConstPtr& message);
+  void receive(const Event& event);
   void receive_state(const sensor_msgs::JointStateConstPtr& message);
-  double present_position(const std::string& joint) const;
+  JointMotionNow present(const std::string& joint) const;
   std::string take_trajectory();
   std::string why_elsewhere(double time) const;
   void look(const ros::Time& now, Message* message);

@@ -15,7 +15,7 @@ using Message = trajectory_msgs::JointTrajectory;
 constexpr std::size_t kMaxPoints = 10000;  // an hour of points, or more
 constexpr std::size_t kMaxPieces = 10000;  // half a second for an answer, or less
 constexpr double kMaxTime = 1e5;           // [s]
-constexpr double kMaxPosition = 1e4;       // [rad, m]
+constexpr double kMaxNumber = 1e4;         // [rad, m]
 
 // The joints by index, or a sentence.
 std::string find_joints(const Message& message, const Kinematics& kinematics,
@@ -43,7 +43,7 @@ std::string check_numbers(const Message& message, std::size_t point, const char*
                        message.joint_names.size());
   }
   for (std::size_t j = 0; j < numbers.size(); ++j) {
-    if (std::abs(numbers[j]) <= kMaxPosition) continue;  // not NaN
+    if (std::abs(numbers[j]) <= kMaxNumber) continue;  // not NaN
     return format_text("points[%zu]: %g among the %s, of joint '%s'", point, numbers[j], what,
                        message.joint_names[j].c_str());
   }
@@ -106,7 +106,7 @@ double distance_between(const Kinematics::Joint& joint, double present, double q
 }
 
 std::string read_trajectory(const Message& message, const Kinematics& kinematics,
-                            const PresentPosition& present, const ros::Time& received,
+                            const PresentMotion& present, const ros::Time& received,
                             WatchedTrajectory* trajectory) {
   std::vector<std::size_t> joints;
   std::string fault = find_joints(message, kinematics, &joints);
@@ -121,11 +121,13 @@ std::string read_trajectory(const Message& message, const Kinematics& kinematics
   JointTrajectory path;
   const auto& first = message.points.front();
   if (first.time_from_start.toSec() > 0.0) {
-    std::vector<double> q;
+    std::vector<double> q, dq;
     for (std::size_t j = 0; j < joints.size(); ++j) {
       const std::string& name = message.joint_names[j];
       const double to = first.positions[j];
-      q.push_back(to + distance_between(kinematics.joints()[joints[j]], present(name), to));
+      const JointMotionNow now = present(name);
+      q.push_back(to + distance_between(kinematics.joints()[joints[j]], now.q, to));
+      dq.push_back(std::abs(now.dq) <= kMaxNumber ? now.dq : 0.0);  // not NaN
       if (std::isnan(q.back())) {
         return "its first point is not at time 0, and the position of joint '" + name +
                "' is not known";
@@ -134,7 +136,7 @@ std::string read_trajectory(const Message& message, const Kinematics& kinematics
     path.times.push_back(0.0);
     path.positions.push_back(by_joint(q, joints, count));
     const std::vector<double> rest(q.size(), 0.0);
-    if (!first.velocities.empty()) path.velocities.push_back(by_joint(rest, joints, count));
+    if (!first.velocities.empty()) path.velocities.push_back(by_joint(dq, joints, count));
     if (!first.accelerations.empty()) path.accelerations.push_back(by_joint(rest, joints, count));
   }
   for (const auto& point : message.points) {

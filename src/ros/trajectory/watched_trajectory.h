@@ -13,8 +13,11 @@
 
 namespace ist {
 
-/// [rad, m] The present position of a joint, by name; NaN where it is not known.
-using PresentPosition = std::function<double(const std::string& joint)>;
+/// Where a joint is now and how fast it moves; NaN where that is not known.
+struct JointMotionNow {
+  double q, dq;  ///< [rad, m], [rad/s, m/s]
+};
+using PresentMotion = std::function<JointMotionNow(const std::string& joint)>;
 
 /// A trajectory that a controller follows, as the library takes it.
 struct WatchedTrajectory {
@@ -31,12 +34,12 @@ struct WatchedTrajectory {
 double distance_between(const Kinematics::Joint& joint, double present, double q);
 
 /// Reads a message with one point or more. Where its first point is not at time 0, the trajectory
-/// begins at the joints' present positions, as controllers do: they leave out whole turns of
-/// continuous joints.
+/// begins at the joints' present positions and velocities, as controllers do: they leave out whole
+/// turns of continuous joints. A velocity that is not known is 0.
 /// @param received  its start, where its stamp is 0
 /// @returns empty, or a sentence: why it cannot be watched
 std::string read_trajectory(const trajectory_msgs::JointTrajectory& message,
-                            const Kinematics& kinematics, const PresentPosition& present,
+                            const Kinematics& kinematics, const PresentMotion& present,
                             const ros::Time& received, WatchedTrajectory* trajectory);
 
 }  // namespace ist
