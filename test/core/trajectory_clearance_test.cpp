@@ -366,6 +366,22 @@ TEST(TrajectoryClearance, whatIsNotKnownIsNotFree) {
   }
 }
 
+TEST(TrajectoryClearance, gradientsOfTheDistanceWhereItIsLeast) {
+  const Robot robot(R"(<robot name="one"><link name="base"/>
+    <link name="ball"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+    <joint name="slide" type="prismatic"><parent link="base"/><child link="ball"/>
+      <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>)");
+  const JointTrajectory path{{0.0, 1.0}, {{0.0}, {0.2}}, {}, {}};
+  const Eigen::Vector3d point(0.5, 0.4, 0.0);
+  const Obstacles obstacles(std::vector<Eigen::Vector3d>{point});
+  const LinkClearance found = robot.clearance({&path, 1}, obstacles)[0];
+  ASSERT_EQ(found.gradient.size(), 1U);
+  const double x = 0.2 * found.nearest_time;
+  EXPECT_NEAR(found.gradient[0], (x - 0.5) / std::hypot(x - 0.5, 0.4), 1e-6);  // points are floats
+  const Obstacles far(std::vector<Eigen::Vector3d>{{30.0, 0.0, 0.0}});
+  EXPECT_TRUE(robot.clearance({&path, 1}, far)[0].gradient.empty());
+}
+
 // Velocities whose sums overflow leave no bound of where the joint is.
 TEST(TrajectoryClearance, hugeNumbersAreNotFree) {
   const Robot robot(R"(<robot name="one"><link name="base"/>
