@@ -23,31 +23,6 @@ example::Reading nothing_near() {
   return reading;
 }
 
-/// Accumulates the deviation of the accelerations from their moving average over 0.1 s.
-double noise(const std::vector<Eigen::VectorXd>& accelerations) {
-  constexpr std::size_t kHalf = 50;  // steps
-  if (accelerations.size() <= 2 * kHalf) return 0.0;
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(accelerations[0].size());
-  for (std::size_t i = 0; i <= 2 * kHalf; ++i) sum += accelerations[i];
-  double total = 0.0;
-  std::size_t count = 0;
-  for (std::size_t i = kHalf; i + kHalf < accelerations.size(); ++i) {
-    total += (accelerations[i] - sum / (2 * kHalf + 1)).squaredNorm();
-    count += static_cast<std::size_t>(sum.size());
-    if (i + kHalf + 1 < accelerations.size()) {
-      sum += accelerations[i + kHalf + 1] - accelerations[i - kHalf];
-    }
-  }
-  return std::sqrt(total / static_cast<double>(count));
-}
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0.0;
-  const auto at = static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
-
 std::vector<std::string> link_names(const RobotModel& model) {
   std::vector<std::string> names;
   for (const LinkModel& link : model.links) names.push_back(link.name);
@@ -133,7 +108,6 @@ example::Reading Perception::reading(const Simulation& world, const example::Con
     link.body = *arm.kinematics.find_body(model_->links[i].name);
     link.lower_bound = results_[i].lower_bound;
     link.p_LCl = results_[i].p_LCl;
-    if (config_.avoidance == Avoidance::kNearest) link.away = results_[i].direction;
     if (config_.avoidance == Avoidance::kBlend) {
       link.away = repulsion_(i, X_FL_[i], clouds, results_[i], config_.repulsion);
     }
@@ -142,15 +116,79 @@ example::Reading Perception::reading(const Simulation& world, const example::Con
   return reading;
 }
 
+FilteredCommand::FilteredCommand(const RobotDescription& robot,
+                                 std::shared_ptr<const RobotModel> model, const ArmConfig& arm)
+    : model_(std::move(model)),
+      kinematics_(std::make_shared<const Kinematics>(robot)),
+      rows_(*model_, kinematics_),
+      filter_(joint_limits(*kinematics_, arm.max_velocity)),
+      speeds_(model_->links.size()) {}
+
+Eigen::VectorXd FilteredCommand::run(const Simulation& world, RowConfig config,
+                                     Perception* perception, const Eigen::VectorXd& command) {
+  Eigen::VectorXd given = Eigen::VectorXd::Zero(command.size());
+  if (!perception->has_seen()) return given;
+  const std::vector<LinkProximity>& answers = perception->answer(world);
+  const std::vector<Eigen::Isometry3d> X_FL = world.link_poses();
+  std::vector<double> obstacle_speeds(answers.size());
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const int source = answers[i].source;
+    const double stamp =
+        source < 0 ? 0.0 : perception->snapshots()[static_cast<std::size_t>(source)].stamp;
+    const auto generation = static_cast<std::uint64_t>(std::llround(stamp / Simulation::kStep));
+    const ClosingRates rates =
+        speeds_[i].update(world.time(), answers[i], X_FL[i], {source, generation, stamp});
+    obstacle_speeds[i] = std::max(0.0, rates.obstacles);  // of NaN: 0
+  }
+  for (const CloudSnapshot& cloud : perception->snapshots()) {
+    config.age = std::max(config.age, world.time() - cloud.stamp);
+  }
+  const std::vector<double> all = world.arm().all_positions(world.arm().positions());
+  JointPoses joint_poses;
+  BodyPoses bodies;
+  kinematics_->place_joints(all, &joint_poses);
+  kinematics_->place_bodies(joint_poses, Eigen::Isometry3d::Identity(), &bodies);
+  rows_.begin(bodies, config);
+  rows_.add_links(answers, obstacle_speeds);
+
+  const std::vector<std::size_t>& columns = rows_.joints();
+  const std::vector<std::size_t>& commanded = world.arm().joints();
+  std::vector<double> wanted(columns.size(), 0.0), q;
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    q.push_back(all[columns[c]]);
+    const auto at = std::find(commanded.begin(), commanded.end(), columns[c]);
+    if (at != commanded.end()) wanted[c] = command[at - commanded.begin()];
+  }
+  const FilterAnswer& answer = filter_.run(wanted, q, rows_.rows());
+  for (std::size_t j = 0; j < commanded.size(); ++j) {
+    const auto at = std::find(columns.begin(), columns.end(), commanded[j]);
+    given[static_cast<Eigen::Index>(j)] =
+        answer.velocity[static_cast<std::size_t>(at - columns.begin())];
+  }
+  return given;
+}
+
 namespace {
 
+/// [m/s] How fast the arm came nearer in the last step, while obstacles stood.
+double driven_speed(const Simulation& world, const Eigen::VectorXd& q_before) {
+  Simulation before = world;
+  before.arm().reset(q_before);
+  const double then = world.time() - Simulation::kStep;
+  return (before.nearest_then(kTruthRange, then).distance -
+          world.nearest_then(kTruthRange, then).distance) /
+         Simulation::kStep;
+}
+
 /// Keeps the smallest true distance so far, and where it was.
-void note_distance(const Simulation& world, const RobotDescription& robot, const Scene& scene,
-                   ClosedLoopResult* result) {
+/// @param q_before  [rad] by commanded joint, before the last step
+void note_distance(const Simulation& world, const Eigen::VectorXd& q_before,
+                   const RobotDescription& robot, const Scene& scene, ClosedLoopResult* result) {
   const Simulation::Truth truth = world.nearest(std::min(result->smallest_distance, kTruthRange));
   if (!(truth.distance < result->smallest_distance)) return;
   if (truth.distance <= 0.0 && result->smallest_distance > 0.0) {
     result->speed_at_touch = world.arm().velocities().cwiseAbs().maxCoeff();
+    result->driven_at_touch = driven_speed(world, q_before);
   }
   result->smallest_distance = truth.distance;
   result->when = world.time();
@@ -173,8 +211,7 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
   ClosedLoopResult result;
   result.smallest_distance = std::numeric_limits<double>::infinity();
   result.task_time = std::numeric_limits<double>::infinity();
-  std::vector<Eigen::VectorXd> accelerations;
-  std::vector<double> command_steps;
+  FilteredCommand filter(robot, model, world.arm().config());
   std::size_t goal = 1 % scene.goals.size();
   Eigen::VectorXd command = Eigen::VectorXd::Zero(scene.goals[0].size());
   for (int step = 0; world.time() < scene.duration ||
@@ -187,18 +224,16 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
         if (++result.goals == scene.task) result.task_time = world.time();
         goal = (goal + 1) % scene.goals.size();
       }
-      const example::Reading reading = is_blind ? nothing_near() : perception.reading(world, arm);
-      const Eigen::VectorXd next =
-          example::dodge(arm, q, scene.goals[goal], reading, config.controller);
-      command_steps.push_back((next - command).cwiseAbs().maxCoeff());
-      command = next;
+      const bool is_filtered = config.avoidance == Avoidance::kFilter;
+      const example::Reading reading =
+          is_blind || is_filtered ? nothing_near() : perception.reading(world, arm);
+      command = example::dodge(arm, q, scene.goals[goal], reading, config.controller);
+      if (is_filtered) command = filter.run(world, config.rows, &perception, command);
     }
+    const Eigen::VectorXd q_before = world.arm().positions();
     world.step(command);
-    accelerations.push_back(world.arm().accelerations());
-    note_distance(world, robot, scene, &result);
+    note_distance(world, q_before, robot, scene, &result);
   }
-  result.acceleration_noise = noise(accelerations);
-  result.largest_command_step = quantile(command_steps, 0.999);
   return result;
 }
 

@@ -10,6 +10,9 @@
 #include "dodge_controller.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/memory_map.h"
+#include "ist_proximity/control/constraint_rows.h"
+#include "ist_proximity/control/velocity_filter.h"
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
@@ -21,10 +24,10 @@ namespace ist::sim {
 
 /// The avoidance signal that the controller follows.
 enum class Avoidance {
-  kNone,     ///< none: the task is done blindly
-  kSlow,     ///< none: the speed scale alone
-  kBlend,    ///< `repulsion`
-  kNearest,  ///< the nearest pair's `direction`
+  kNone,    ///< none: the task is done blindly
+  kSlow,    ///< none: the speed scale alone
+  kBlend,   ///< `repulsion`
+  kFilter,  ///< none: the blind task's velocities pass through a VelocityFilter
 };
 
 struct ClosedLoopConfig {
@@ -36,11 +39,14 @@ struct ClosedLoopConfig {
   QueryConfig query;
   RepulsionConfig repulsion;
   SpeedScaleConfig speed_scale;
+  RowConfig rows;
   bool remember = false;  ///< what a camera no longer sees stays, as the node's ~memory
   MemoryConfig memory;
   ClosedLoopConfig() {
-    speed_scale.free_distance = 0.25;    // as in config/dodge.yaml
-    ingest.self_filter_padding = 0.03;   // six times the cameras' noise
+    speed_scale.free_distance = 0.25;   // as in config/dodge.yaml
+    ingest.self_filter_padding = 0.03;  // six times the cameras' noise
+    // Within the padding nothing is seen, and drives need some way, too.
+    rows.stop_distance = 0.1;
     repulsion.influence_distance = 0.5;  // more than any distance the controller reacts to
   }
 };
@@ -81,6 +87,27 @@ class Perception {
   std::vector<Eigen::Isometry3d> X_FL_;
 };
 
+/// Passes velocities through a VelocityFilter, its rows those of a Perception, with the speeds of
+/// obstacles that the node would tell.
+class FilteredCommand {
+ public:
+  FilteredCommand(const RobotDescription& robot, std::shared_ptr<const RobotModel> model,
+                  const ArmConfig& arm);
+
+  /// @param command  [rad/s] by commanded joint
+  /// @param config   its age is set
+  /// @returns 0 until every camera has delivered an image
+  Eigen::VectorXd run(const Simulation& world, RowConfig config, Perception* perception,
+                      const Eigen::VectorXd& command);
+
+ private:
+  std::shared_ptr<const RobotModel> model_;
+  std::shared_ptr<const Kinematics> kinematics_;
+  ConstraintRowBuilder rows_;
+  VelocityFilter filter_;
+  std::vector<ClosingSpeed> speeds_;
+};
+
 /// Measurements of one run of a scene.
 struct ClosedLoopResult {
   double smallest_distance = 0.0;  ///< [m] true distance of any moved link to any obstacle
@@ -90,10 +117,9 @@ struct ClosedLoopResult {
   double task_time = 0.0;          ///< [s] when the task was done; inf: it was not
   /// [rad/s] of the fastest joint at the first touch; 0 without any.
   double speed_at_touch = 0.0;
-  /// [rad/s^2] Root mean square, over joints and steps, of the acceleration's deviation from its
-  /// moving average over 0.1 s.
-  double acceleration_noise = 0.0;
-  double largest_command_step = 0.0;  ///< [rad/s] 99.9th percentile, between two commands
+  /// [m/s] at which the arm, by its own motion alone, came nearer to what it touched first; 0
+  /// without any touch.
+  double driven_at_touch = 0.0;
 };
 
 /// Runs a scene: simulator -> ingest with self-filter -> query -> repulsion -> controller -> arm.

@@ -98,6 +98,76 @@ bool keeps_rules(const Obstacle& body, const Simulation& world, const std::vecto
   return true;
 }
 
+std::vector<Solid> solids_of(const RobotDescription& robot) {
+  std::vector<Solid> solids;
+  for (const LinkDescription& link : robot.links) solids.emplace_back(link.geometry);
+  return solids;
+}
+
+// [m] From the links that joints move to a body that stands, where less than `most`.
+double distance_to(const Obstacle& body, const Arm& arm, const std::vector<Solid>& solids,
+                   const Eigen::VectorXd& q, double most) {
+  const std::vector<Eigen::Isometry3d> X_FL = arm.link_poses(q);
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    if (!arm.moved()[i]) continue;
+    most = std::min(most, distance(solids[i], X_FL[i], body, body.pose(0.0), most));
+  }
+  return most;
+}
+
+void add_clutter(const SceneRules& rules, const Arm& arm, const std::vector<Solid>& solids,
+                 const Simulation& world, const std::vector<Eigen::VectorXd>& motion, Rng* rng,
+                 Scene* scene) {
+  for (int k = 0; k < kTries; ++k) {
+    Obstacle body = random_body(rng);
+    const auto X_FL = arm.link_poses(motion[(*rng)() % motion.size()]);
+    std::size_t link = (*rng)() % X_FL.size();
+    while (!arm.moved()[link]) link = (*rng)() % X_FL.size();
+    const double aside = rules.clutter_aside;
+    const Eigen::Vector3d beside(uniform(rng, -aside, aside), uniform(rng, -aside, aside),
+                                 uniform(rng, -aside, aside));
+    body.from = world.middle(link, X_FL[link]) + beside;
+    body.name = "clutter";
+    const double near = rules.clutter_clearance;
+    const auto is_free = [&](const Eigen::VectorXd& goal) {
+      return distance_to(body, arm, solids, goal, near) >= near;
+    };
+    if (!std::all_of(scene->goals.begin(), scene->goals.end(), is_free)) continue;
+    scene->obstacles.push_back(body);
+    return;
+  }
+  give_up("clutter");
+}
+
+// A column of 0.4 m across: two square ones, turned by 45 degrees.
+void add_person(const SceneRules& rules, double time, Rng* rng, Scene* scene) {
+  constexpr double kHeight = 1.75, kFloor = -0.95, kWay = 4.0, kFromCamera = 0.6;  // [m]
+  for (int k = 0; k < kTries; ++k) {
+    const double angle = uniform(rng, -M_PI, M_PI);
+    const Eigen::Vector3d along(std::cos(angle), std::sin(angle), 0.0);
+    const Eigen::Vector3d aside(-along.y(), along.x(), 0.0);
+    const Eigen::Vector3d middle = uniform(rng, rules.near_walk, rules.far_walk) * aside +
+                                   Eigen::Vector3d(0.0, 0.0, kFloor + 0.5 * kHeight);
+    const auto is_beside = [&](const DepthCameraConfig& camera) {
+      return std::abs((camera.X_FC.translation() - middle).dot(aside)) > kFromCamera;
+    };
+    if (!std::all_of(scene->cameras.begin(), scene->cameras.end(), is_beside)) continue;
+    for (const double turn : {0.0, 0.25 * M_PI}) {
+      Obstacle column;
+      column.name = "person";
+      column.shape = Box{{0.37, 0.37, kHeight}};
+      column.R_FO = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      column.from = middle - kWay * along;
+      column.to = middle + kWay * along;
+      column.speed = rules.walking_speed;
+      column.start = time - kWay / column.speed;
+      scene->obstacles.push_back(column);
+    }
+    return;
+  }
+  give_up("person");
+}
+
 }  // namespace
 
 ArmConfig demo_arm() {
@@ -193,7 +263,49 @@ Scene make_scene(const RobotDescription& robot, std::uint64_t seed, const SceneR
     }
     if (!found) give_up("obstacle");
   }
+  const std::vector<Solid> solids = solids_of(robot);
+  for (int n = 0; n < rules.clutter; ++n) {
+    add_clutter(rules, world.arm(), solids, world, motion, &rng, &scene);
+  }
+  for (int n = 0; n < rules.people; ++n) {
+    add_person(rules, rules.first_aim + n * rules.aim_interval, &rng, &scene);
+  }
   return scene;
+}
+
+Scene make_near_start(const RobotDescription& robot, std::uint64_t seed,
+                      const std::function<std::vector<Eigen::VectorXd>(const Scene&)>& nominal) {
+  constexpr double kLeast = 0.015, kMost = 0.045, kAway = 0.08;  // [m]
+  SceneRules rules;
+  rules.obstacles = 0;
+  Scene scene = make_scene(robot, seed, rules, nominal);
+  scene.task = 1;
+  scene.duration = 0.0;
+  scene.patience = 6.0;
+  Rng rng(seed);
+  const Arm arm(robot, demo_arm());
+  const std::vector<Solid> solids = solids_of(robot);
+  for (int k = 0; k < kTries; ++k) {
+    Obstacle ball;
+    ball.name = "ball";
+    ball.shape = Sphere{0.06};
+    ball.from = {uniform(&rng, -0.2, 0.9), uniform(&rng, -0.9, 0.9), uniform(&rng, -0.1, 0.9)};
+    const auto at = [&](double share) {
+      const Eigen::VectorXd q = scene.goals[0] + share * (scene.goals[1] - scene.goals[0]);
+      return distance_to(ball, arm, solids, q, 0.5);
+    };
+    double last = at(0.0);
+    bool leads_away = last >= kLeast && last <= kMost;
+    for (int i = 1; i <= 20 && leads_away; ++i) {
+      const double next = at(0.05 * i);
+      leads_away = next > std::min(last, kAway);
+      last = next;
+    }
+    if (!leads_away) continue;
+    scene.obstacles.push_back(ball);
+    return scene;
+  }
+  give_up("ball");
 }
 
 }  // namespace ist::sim

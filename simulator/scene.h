@@ -34,6 +34,13 @@ struct SceneRules {
   double hub_clearance = 0.30;   ///< [m] from the shoulder's axis, near which the arm cannot yield
   double base_clearance = 0.10;  ///< [m] from links that cannot move and from fixed obstacles
   double goal_clearance = 0.28;  ///< [m] from fixed obstacles, on the straight path between goals
+  int clutter = 0;               ///< bodies that stand beside the path, or in it
+  double clutter_aside =
+      0.15;  ///< [m] along each axis at most, from the middle of a link on its way
+  double clutter_clearance = 0.12;  ///< [m] from the arm at its goals
+  int people = 0;                   ///< columns that walk past, one at a time, as bodies do
+  double walking_speed = 1.6;       ///< [m/s]
+  double near_walk = 0.55, far_walk = 0.80;  ///< [m] from the shoulder's axis to their middle
 };
 
 /// A random scene: the demo arm moves between two goals above its bench, two cameras look from
@@ -43,6 +50,11 @@ struct SceneRules {
 /// @param nominal  positions of the undisturbed arm every 10 ms, for a scene
 Scene make_scene(const RobotDescription& robot, std::uint64_t seed, const SceneRules& rules,
                  const std::function<std::vector<Eigen::VectorXd>(const Scene&)>& nominal);
+
+/// The same arm before one goal: it starts with a ball 15 to 45 mm from one of its links, and the
+/// straight way to the goal leads away from it.
+Scene make_near_start(const RobotDescription& robot, std::uint64_t seed,
+                      const std::function<std::vector<Eigen::VectorXd>(const Scene&)>& nominal);
 
 /// Bench and floor of the demo, which are fixed.
 std::vector<Obstacle> demo_surroundings();
