@@ -324,6 +324,22 @@ TEST_F(RowsOfAnswers, CountTheObstaclesSpeedAndAge) {
   EXPECT_LT(row(near(0.25), config, 0.1).h[0], unstated);
 }
 
+TEST_F(RowsOfAnswers, AreBoundedInAnotherWayFromThereOn) {
+  RowConfig config, other;
+  other.stop_distance = other.margin = 0.0;
+  EXPECT_EQ(row(near(0.03), config).h[0], 0.0);
+  builder_.set_config(other);
+  builder_.add_link(robot_.model->links.size() - 1, near(0.03));
+  const ConstraintRows& rows = builder_.rows();
+  ASSERT_TRUE(rows.is_complete);
+  EXPECT_EQ(rows.h[0], 0.0);
+  EXPECT_NEAR(rows.h[1], 0.03 / other.approach_time, 1e-8);
+  EXPECT_NEAR(rows.sweep_limit[1], 0.03 / config.horizon, 1e-6);
+  other.horizon *= 2.0;
+  builder_.set_config(other);
+  EXPECT_FALSE(rows.is_complete);
+}
+
 TEST_F(RowsOfAnswers, AreIncompleteWhereSizesOrSettingsAreWrong) {
   const auto is_complete = [&](const RowConfig& config, std::size_t answers) {
     builder_.begin(robot_.forward.bodies(), config);

@@ -173,6 +173,17 @@ class LaunchFilesTest(unittest.TestCase):
         self.assertEqual(config.params["/near/sources/cell/topic"].value, "world_objects")
         self.assertTrue(pt.find_program("ist_proximity", bridge.type))
 
+    def test_scale_for_servo(self):
+        topic = "/servo_server/internal/collision_velocity_scale"
+        for manager in ("", "some_manager"):
+            arguments = ["speed_scale:=" + topic, "tool:=tool0", "manager:=" + manager]
+            (node,) = loaded("velocity_filter.launch", *arguments).nodes
+            remaps = dict(tuple(pair) for pair in node.remap_args)
+            self.assertEqual(remaps["~speed_scale"], topic)
+            self.assertTrue(node.required)
+        (node,) = loaded("velocity_filter.launch", "name:=near").nodes
+        self.assertEqual(dict(map(tuple, node.remap_args))["~speed_scale"], "near/speed_scale")
+
     def test_common_arguments(self):
         """roslaunch drops arguments that a file does not know, without a word."""
         common = launch_arguments("proximity.launch") - {"cloud"}

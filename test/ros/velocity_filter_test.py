@@ -35,6 +35,12 @@ POST = """  <link name="post"><collision><geometry><sphere radius="0.1"/></geome
     <origin xyz="0 0.5 0"/></joint>
 </robot>"""
 
+# Both joints slide along x; the first one alone moves what comes to the wall.
+REDUNDANT = SLIDES.replace(
+    '<link name="beam"/>',
+    '<link name="beam"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>',
+).replace('<axis xyz="0 1 0"/>', '<origin xyz="0 1.5 0"/><axis xyz="1 0 0"/>')
+
 WALL = 1.0  # [m] along x
 RADIUS = 0.1
 STOP = 0.05
@@ -96,6 +102,7 @@ class VelocityFilterTest(unittest.TestCase):
         self.nearest = np.inf
         self.robot = self.world.repeat(1.0 / PERIOD, self.move)
         has_post = "post" in self._testMethodName
+        robot = REDUNDANT if "redundant" in self._testMethodName else SLIDES
         self.node = pt.ProximityNode(
             self.namespace,
             {
@@ -103,14 +110,14 @@ class VelocityFilterTest(unittest.TestCase):
                 "self_filter": False,
                 "self_collision/enabled": has_post,
             },
-            SLIDES.replace("</robot>", POST) if has_post else SLIDES,
+            robot.replace("</robot>", POST) if has_post else robot,
         )
         self.node.wait_for_status(ProximityArray.OK)
 
     def tearDown(self):
+        self.world.stop()
         if self.filter:
             self.filter.stop()
-        self.world.stop()
         self.assertEqual(self.node.stop(), 0)
 
     def move(self):
@@ -275,6 +282,19 @@ class VelocityFilterTest(unittest.TestCase):
         self.wanted = (np.nan, 0.0)
         self.check_fault("not a finite number")
         pt.wait_until(lambda: not np.any(self.velocity), "the ball to stand")
+
+    def test_twist_of_a_redundant_robot(self):
+        """The second slide could make the twist, but who receives it may take both."""
+        self.q = np.array([WALL - RADIUS - 0.03, 0.0])
+        self.node.wait_for(lambda m: pt.link(m, "beam").distance < 0.04, "the beam at the wall")
+        self.robot.function = lambda: self.send_joints(self.q)
+        self.start(0.1, 0.0, command_type="geometry_msgs/TwistStamped")
+        state = self.wait_for(FilterState.STOPPED, "'beam'")
+        self.assertFalse(np.any(state.velocity))
+        self.wanted = (-0.1, 0.0)
+        state = self.wait_for(FilterState.FREE)
+        np.testing.assert_allclose(state.velocity, [-0.05, -0.05], atol=1e-9)
+        self.assertAlmostEqual(self.filter.given[-1].twist.linear.x, -0.1, 9)
 
     def test_started_inside_the_stop_distance(self):
         self.q = np.array([WALL - RADIUS - 0.02, 0.0])

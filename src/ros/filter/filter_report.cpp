@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/publish.h"
@@ -64,7 +65,7 @@ void CommandFilter::draw(const FilterAnswer& answer, const std_msgs::Header& hea
   marker.action = Marker::ADD;
   marker.pose.orientation.w = 1.0;
   marker.lifetime = ros::Duration(kShown);
-  for (const std::size_t row : answer.rows) {
+  for (const std::size_t row : std::set<std::size_t>(answer.rows.begin(), answer.rows.end())) {
     const RowOrigin& origin = rows_.origins[row];
     const RowAnswer held = proximity_->answer(origin);
     const bool has_line = held.p_Rl.allFinite() && held.p_Ro.allFinite();
