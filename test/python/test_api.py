@@ -254,7 +254,7 @@ def test_the_interpreter_runs_during_queries(robot):
 
 
 def cloud_message(points, number='<f4', **changes):
-    """A sensor_msgs/PointCloud2 of (height, width, 3), with a field before each point."""
+    """A sensor_msgs/PointCloud2 of (height, width, 3), with bytes before and after each point and row."""
     height, width, _ = points.shape
     rows = np.zeros((height, width), np.dtype([('ring', 'u2'), ('xyz', number, 3), ('spare', 'u1', 2)]))
     rows['xyz'] = points
@@ -264,8 +264,8 @@ def cloud_message(points, number='<f4', **changes):
                for k, name in enumerate('xyz')]
     step = rows.dtype.itemsize
     message = types.SimpleNamespace(fields=fields, width=width, height=height, point_step=step,
-                                    row_step=width * step, is_bigendian=number[0] == '>',
-                                    data=rows.tobytes(), is_dense=False)
+                                    row_step=width * step + 5, is_bigendian=number[0] == '>',
+                                    data=b''.join(row.tobytes() + 5 * b'?' for row in rows), is_dense=False)
     vars(message).update(changes)
     return message
 
