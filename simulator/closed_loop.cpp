@@ -234,6 +234,7 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
     world.step(command);
     note_distance(world, q_before, robot, scene, &result);
   }
+  result.last_distance = world.nearest(kTruthRange).distance;
   return result;
 }
 

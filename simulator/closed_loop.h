@@ -112,6 +112,7 @@ class FilteredCommand {
 struct ClosedLoopResult {
   double smallest_distance = 0.0;  ///< [m] true distance of any moved link to any obstacle
   double when = 0.0;               ///< [s] of the smallest distance
+  double last_distance = 0.0;      ///< [m] the same at the end; inf far from all
   std::string link, obstacle;      ///< of the smallest distance
   int goals = 0;                   ///< number of goals reached
   double task_time = 0.0;          ///< [s] when the task was done; inf: it was not
