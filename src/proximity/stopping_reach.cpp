@@ -28,7 +28,7 @@ StoppingReach scaled(const StoppingReach& reach, double factor) {
   return {factor * reach.speed, factor * reach.distance, reach.time};
 }
 
-/// What a joint does that moves at v and brakes with `a`.
+/// A joint that moves at v and brakes with `a`.
 StoppingReach braking(double v, double a) {
   StoppingReach reach;
   if (std::isnan(v)) return reach;

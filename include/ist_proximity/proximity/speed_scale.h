@@ -87,7 +87,7 @@ struct SpeedScaleInput {
   double lower_bound = -std::numeric_limits<double>::infinity();  ///< [m] proven
   /// [m/s] ClosingRates::obstacles; NaN: not known
   double obstacle_speed = std::numeric_limits<double>::quiet_NaN();
-  /// What the link reaches until it stands, from the speed at scale 1; none: see SeparationConfig.
+  /// The link's way until it stands, from the speed at scale 1; none: see SeparationConfig.
   std::optional<StoppingReach> reach = std::nullopt;
 };
 

@@ -10,7 +10,7 @@
 
 namespace ist {
 
-/// What a joint, or a link, still does until it stands. +inf: not known.
+/// The motion of a joint, or of a link, until it stands. +inf: not known.
 struct StoppingReach {
   double speed = std::numeric_limits<double>::infinity();  ///< [rad/s, m/s] nothing of it is faster
   double distance = std::numeric_limits<double>::infinity();  ///< [rad, m] nothing goes farther
@@ -31,7 +31,7 @@ void brake_joints(const Kinematics& kinematics, Span<const double> velocities,
 /// Bounds what a link can reach. A distance that is proven now is left, less `distance`, wherever
 /// the joints are on their way: each anywhere between here and where it stands, in any order.
 ///
-/// Where joints end does not depend on whether they move together or one after the other. From the
+/// The joints end at the same place if they move together or one after the other. From the
 /// root on, each one finds its axis and the link as far apart as they are now: it carries no point
 /// farther than its angle times the largest distance of the link's box from that axis, and a
 /// sliding joint no farther than it slides.

@@ -15,7 +15,7 @@
 
 namespace ist {
 
-/// What the links can still sweep until the robot stands, where ~joint_deceleration is stated.
+/// Bounds what links can still sweep until the robot stands, where ~joint_deceleration is stated.
 class RobotFuture {
  public:
   /// @param kinematics  null where it is faulty: nothing is known then
