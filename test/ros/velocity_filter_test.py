@@ -413,12 +413,67 @@ class VelocityFilterTest(unittest.TestCase):
         self.world.repeat(50, answer_nothing)
         self.check_fault("of no link: no URDF yet")
 
-    def test_trajectories_that_cannot_be_used(self):
+    def test_stamps_that_are_ahead(self):
+        """As long as they lie ahead, nobody could tell that no more come."""
+        ahead = rospy.Duration(0.8)
+        joints = self.joint_publisher
+
+        def send_ahead():
+            state = JointState(name=JOINTS, position=[0.0, 0.0])
+            state.header.stamp = rospy.Time.now() + ahead
+            joints.publish(state)
+
         self.start(0.1, 0.0)
         self.wait_for(FilterState.FREE)
-        self.commands.paused = True
+        self.robot.function = send_ahead
+        self.wait_for(FilterState.FREE)
+        self.robot.paused = True
+        last = rospy.Time.now()
+        state = self.check_fault("~joint_timeout is 0.1 s")
+        self.assertLess((state.header.stamp - last).to_sec(), 0.5)
+        self.robot.function, self.robot.paused = self.move, False
+        self.wait_for(FilterState.FREE)
+
+        newest = self.node.messages[-1]
+        self.assertEqual(self.node.stop(), 0)
+        answers = rospy.Publisher(self.namespace + "/proximity/proximity", ProximityArray, queue_size=1)
+
+        def answer_ahead():
+            newest.header.stamp = rospy.Time.now() + ahead
+            answers.publish(newest)
+
+        self.world.repeat(50, answer_ahead)
+        self.check_fault("ahead of the clock")
+
+    def test_joint_states_that_come_seldom(self):
+        """Between them, the robot has moved by all that was given."""
+        self.count = 0
+
+        def move_silently():
+            with self.lock:
+                if self.filter.given:
+                    self.velocity = self.given_velocity(self.filter.given[-1])
+                self.q = self.q + PERIOD * self.velocity
+                self.nearest = min(self.nearest, WALL - RADIUS - self.q[0])
+                self.count += 1
+            if self.count % 12 == 0:
+                self.send_joints(self.q)
+
+        self.start(
+            *[2.0, 0.0],
+            **{"joint_timeout": 0.3, "proximity_timeout": 0.5, "approach_time": 0.02},
+            **{"margin": 0.03, "stop_distance": 0.03}
+        )
+        self.robot.function = move_silently
+        pt.wait_until(lambda: self.nearest < 0.1, "the ball to come near")
+        rospy.sleep(1.0)
+        self.assertGreater(self.nearest, 0.0)
+
+    def test_trajectories_that_cannot_be_used(self):
+        self.start(0.1, 0.0)
         for message, text in (
             (JointTrajectory(joint_names=JOINTS), "has 0 points"),
+            (JointTrajectory(points=[JointTrajectoryPoint()]), "has no joints"),
             (
                 JointTrajectory(
                     joint_names=["along", "neck"],
@@ -440,8 +495,12 @@ class VelocityFilterTest(unittest.TestCase):
                 "time_from_start above 0",
             ),
         ):
+            self.commands.paused = False
+            self.wait_for(FilterState.FREE)
+            self.commands.paused = True
             publish = self.world.repeat(20, lambda message=message: self.filter.publisher.publish(message))
-            self.check_fault(text)
+            # Whoever keeps the last velocity of each joint has 0 for all that moved.
+            self.assertEqual(list(self.check_fault(text).joints), JOINTS)
             publish.stop()
 
     def test_wrong_parameters_are_refused(self):

@@ -118,12 +118,15 @@ void CommandFilter::receive(const Message& message) {
     state->joints = command.joints;
     state->velocity = velocity;
     state->computation_time = time;
+    note_given(*state);
     publish_message(state_, *state);
   };
   FilterState state;
   const std::vector<double> velocity = filter(command, &state);
   last_command_ = state.header.stamp;
   publish_scale(given_scale_, scale_);
+  // Nobody could use 0 for joints that the robot lacks: those that were commanded before stop.
+  if (halt_ && !can_be_used(command)) return halt_(state.status_text);
   give(velocity, &state, std::chrono::duration<double>(Clock::now() - begin).count());
   halt_ = [this, give, command](const std::string& reason) {
     FilterState none;
@@ -216,6 +219,8 @@ bool CommandFilter::clock_has_gone_back() {
   if (history_) history_->clear();
   obstacles_ = self_ = PlacedAnswers();
   newest_scale_ = 0.0;
+  given_.clear();
+  last_command_ = now;
   if (halt_) halt_("the clock has gone back");
   return true;
 }
@@ -241,6 +246,12 @@ std::optional<std::size_t> CommandFilter::column_of(const std::string& joint) co
   return std::nullopt;
 }
 
+bool CommandFilter::can_be_used(const JointCommand& command) const {
+  return command.fault.empty() && kinematics_ &&
+         std::all_of(command.joints.begin(), command.joints.end(),
+                     [this](const std::string& joint) { return column_of(joint).has_value(); });
+}
+
 double CommandFilter::position_of(const std::string& joint) const {
   const auto index = kinematics_ ? kinematics_->find_joint(joint) : std::nullopt;
   return index ? history_->newest(*index) : kNaN;
@@ -259,6 +270,13 @@ std::string CommandFilter::why_not(const JointCommand& command, const ros::Time&
   }
   std::string late = history_->late_joint(now, config_.joint_timeout);
   if (!late.empty()) return late;
+  for (const std::size_t j : proximity_->joints()) {
+    const std::string& name = kinematics_->joints()[j].name;
+    const auto& joints = command.joints;
+    if (std::find(joints.begin(), joints.end(), name) != joints.end()) continue;
+    if (std::isfinite(history_->velocity(j, kSpeedWindow))) continue;
+    return "joint '" + name + "' is not commanded, and how fast it moves is not known yet";
+  }
   std::string fault = why_not(obstacles_, answers_, now);
   if (!config_.self_proximity || !fault.empty()) return fault;
   fault = why_not(self_, self_answers_, now);
@@ -279,7 +297,7 @@ std::string CommandFilter::why_not(const PlacedAnswers& placed, const ros::Subsc
     return format_text("the distances of '%s' are %.2f s old; ~proximity_timeout is %g s",
                        subscriber.getTopic().c_str(), age, config_.proximity_timeout);
   }
-  if (age < -kMaxAhead) {
+  if (age < -kToldSkew) {
     return format_text("the distances are %.2f s ahead of the clock; compare the clocks", -age);
   }
   return placed.fault;
@@ -356,18 +374,17 @@ const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::T
     command_column_[column] = command.velocity[i];
   }
   for (std::size_t c = 0; c < q_column_.size(); ++c) q_column_[c] = q_now_[proximity_->joints()[c]];
-  hold_others(is_commanded, now);
+  hold_others(is_commanded);
+  take_off_given(now, config_.rows.horizon);
   return filter_->run(command_column_, q_column_, rows_, config_.time_limit);
 }
 
 /// Joints that are not commanded go on as they move now: what they do comes off the limits, and
 /// their columns are 0.
-void CommandFilter::hold_others(const std::vector<bool>& is_commanded, const ros::Time& now) {
-  const bool has_speed = history_->at(now - ros::Duration(kSpeedWindow), &q_before_);
+void CommandFilter::hold_others(const std::vector<bool>& is_commanded) {
   for (std::size_t c = 0; c < is_commanded.size(); ++c) {
     if (is_commanded[c]) continue;
-    const std::size_t joint = proximity_->joints()[c];
-    const double speed = has_speed ? (q_now_[joint] - q_before_[joint]) / kSpeedWindow : 0.0;
+    const double speed = history_->velocity(proximity_->joints()[c], kSpeedWindow);
     const auto column = static_cast<Eigen::Index>(c);
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.count); ++i) {
       rows_.h[i] -= rows_.G(i, column) * speed;
@@ -375,6 +392,40 @@ void CommandFilter::hold_others(const std::vector<bool>& is_commanded, const ros
           std::max(0.0, rows_.sweep_limit[i] - rows_.sweep(i, column) * std::abs(speed));
       rows_.G(i, column) = rows_.sweep(i, column) = 0.0;
     }
+  }
+}
+
+/// Remembers a velocity for take_off_given().
+void CommandFilter::note_given(const FilterState& state) {
+  if (!proximity_) return;
+  std::vector<double> speeds(proximity_->joints().size(), 0.0);
+  for (std::size_t i = 0; i < state.joints.size(); ++i) {
+    const auto column = column_of(state.joints[i]);
+    if (column) speeds[*column] = std::abs(state.velocity[i]);
+  }
+  given_.push_back({state.header.stamp, std::move(speeds)});
+  // A joint state that counts is no older; the first velocity was given before that.
+  while (given_.size() > 1 &&
+         seconds_between(given_[1].time, state.header.stamp) > config_.joint_timeout) {
+    given_.pop_front();
+  }
+}
+
+/// What the given velocities have used, since the joints were stated, comes off what points of a
+/// link may move: these were other ones than the present one.
+void CommandFilter::take_off_given(const ros::Time& now, double horizon) {
+  const double age = history_->age(now);
+  Eigen::VectorXd moved = Eigen::VectorXd::Zero(rows_.sweep.cols());
+  double until = 0.0;  // [s] before now
+  for (auto given = given_.rbegin(); given != given_.rend() && until < age; ++given) {
+    const double from = std::clamp(seconds_between(given->time, now), until, age);
+    moved += (from - until) * Eigen::Map<const Eigen::VectorXd>(given->speeds.data(), moved.size());
+    until = from;
+  }
+  for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.count); ++i) {
+    if (!rows_.origins[static_cast<std::size_t>(i)].is_proven) continue;
+    const double left = rows_.sweep_limit[i] * rows_.horizon - rows_.sweep.row(i).dot(moved);
+    rows_.sweep_limit[i] = std::clamp(left / horizon, 0.0, rows_.sweep_limit[i]);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <tf2_ros/transform_listener.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -55,7 +56,11 @@ class CommandFilter {
                       const ros::Time& now) const;
   const FilterAnswer& run(const JointCommand& command, const ros::Time& now);
   bool is_twist_proven(const JointCommand& command, const std::vector<double>& velocity);
-  void hold_others(const std::vector<bool>& is_commanded, const ros::Time& now);
+  void hold_others(const std::vector<bool>& is_commanded);
+  void note_given(const ist_proximity::FilterState& state);
+  void take_off_given(const ros::Time& now, double horizon);
+  /// Whether it can be read and is of the robot's joints.
+  bool can_be_used(const JointCommand& command) const;
   void explain(const FilterAnswer& answer, ist_proximity::FilterState* state) const;
   void draw(const FilterAnswer& answer, const std_msgs::Header& header) const;
   std::optional<std::size_t> column_of(const std::string& joint) const;
@@ -74,7 +79,12 @@ class CommandFilter {
   std::optional<VelocityFilter> filter_;
   PlacedAnswers obstacles_, self_;
   ConstraintRows rows_;
-  std::vector<double> q_now_, q_before_, q_column_, command_column_;
+  std::vector<double> q_now_, q_column_, command_column_;
+  struct Given {
+    ros::Time time;
+    std::vector<double> speeds;  ///< [rad/s, m/s] >= 0, by column
+  };
+  std::deque<Given> given_;  ///< of the time that joint states may be old
 
   ros::Publisher safe_command_, state_, scale_, markers_;
   ros::Subscriber command_, answers_, self_answers_, joints_, node_scale_;

@@ -26,11 +26,12 @@ void JointHistory::clear() {
 }
 
 void JointHistory::add(const sensor_msgs::JointState& message, const ros::Time& now) {
-  const ros::Time& stamp = message.header.stamp;
-  if (message.position.size() != message.name.size() || stamp.isZero() ||
-      seconds_between(now, stamp) > kMaxAhead) {
+  const double ahead = seconds_between(now, message.header.stamp);
+  if (message.position.size() != message.name.size() || message.header.stamp.isZero() ||
+      ahead > kMaxAhead) {
     return;
   }
+  const ros::Time& stamp = ahead > kClockResolution ? now : message.header.stamp;
   bool is_new = false;
   for (std::size_t i = 0; i < message.name.size(); ++i) {
     const auto joint = kinematics_->find_joint(message.name[i]);
@@ -68,6 +69,15 @@ bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q) const {
   return true;
 }
 
+double JointHistory::velocity(std::size_t joint, double window) const {
+  const ros::Time& newest = stamp_[joint];
+  for (auto sample = samples_.rbegin(); sample != samples_.rend(); ++sample) {
+    const double passed = seconds_between(sample->stamp, newest);
+    if (passed >= window) return (q_[joint] - sample->q[joint]) / passed;
+  }
+  return kNaN;
+}
+
 double JointHistory::age(const ros::Time& now) const {
   double oldest = 0.0;
   for (std::size_t j = 0; j < q_.size(); ++j) {
@@ -81,7 +91,8 @@ double JointHistory::age(const ros::Time& now) const {
 std::string JointHistory::late_joint(const ros::Time& now, double timeout) const {
   const auto& joints = kinematics_->joints();
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (!joints[j].is_free()) continue;
+    const bool is_stated_mimic = joints[j].source != j && !std::isnan(q_[j]);
+    if (!joints[j].is_free() && !is_stated_mimic) continue;
     if (std::isnan(q_[j])) return "no position of joint '" + joints[j].name + "' has been stated";
     const double age = seconds_between(stamp_[j], now);
     if (age > timeout) {

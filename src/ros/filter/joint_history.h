@@ -19,7 +19,8 @@ class JointHistory {
 
   /// Takes the positions of a message that can be used: names and positions of one size, finite, a
   /// stamp that is not 0, not older than the last one of the joint and not ahead of the clock by
-  /// more than kMaxAhead. Others stay as they are.
+  /// more than kMaxAhead; those that are ahead by more than kClockResolution are taken for present
+  /// ones. Others stay as they are.
   void add(const sensor_msgs::JointState& message, const ros::Time& now);
   /// Forgets everything: the clock has gone back.
   void clear();
@@ -32,11 +33,15 @@ class JointHistory {
   /// The newest position [rad, m] of a joint; NaN: not known.
   double newest(std::size_t joint) const { return q_[joint]; }
 
+  /// [rad/s, m/s] A joint's mean velocity over the last `window` [s] > 0 before its newest
+  /// position, or a little longer. NaN where the history does not reach back so far.
+  double velocity(std::size_t joint, double window) const;
+
   /// [s] since the oldest of the newest positions, of joints with a position of their own.
   double age(const ros::Time& now) const;
 
-  /// A sentence about a joint with a position of its own that is not known, or was stated more than
-  /// `timeout` [s] ago; empty: there is none.
+  /// A sentence about a joint with a position of its own that is not known, or about one, mimic
+  /// joints included, that was stated more than `timeout` [s] ago; empty: there is none.
   std::string late_joint(const ros::Time& now, double timeout) const;
 
  private:

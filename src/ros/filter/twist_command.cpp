@@ -96,11 +96,12 @@ JointCommand read_command(const geometry_msgs::TwistStamped& message, const Comm
   }
   if (!command.fault.empty()) return command;
   const Eigen::VectorXd velocity = least_velocity(command.jacobian, twist);
-  const double missing = (command.jacobian * velocity - twist).norm();
-  if (!(missing <= kRounding * twist.norm())) {
+  const double missing = (command.jacobian * velocity - twist).stableNorm();
+  const double size = twist.stableNorm();
+  if (!(missing <= kRounding * size) || !std::isfinite(size)) {
     command.fault = format_text(
         "'%s' cannot move so where it is: %.3g of the twist's %.3g m/s, rad/s are missing",
-        tool.c_str(), missing, twist.norm());
+        tool.c_str(), missing, size);
     return command;
   }
   command.velocity.assign(velocity.data(), velocity.data() + velocity.size());

@@ -1,0 +1,71 @@
+#include "ros/filter/joint_history.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/robot/robot_description.h"
+
+namespace ist {
+namespace {
+
+constexpr const char* kGripper = R"(<robot name="gripper">
+  <link name="palm"/><link name="left"/><link name="right"/>
+  <joint name="left" type="prismatic"><parent link="palm"/><child link="left"/>
+    <limit lower="0" upper="1" velocity="1" effort="1"/></joint>
+  <joint name="right" type="prismatic"><parent link="palm"/><child link="right"/>
+    <limit lower="0" upper="1" velocity="1" effort="1"/><mimic joint="left"/></joint>
+</robot>)";
+
+class JointHistoryTest : public ::testing::Test {
+ protected:
+  JointHistoryTest()
+      : kinematics_(std::make_shared<const Kinematics>(parse_urdf(
+            kGripper, GeometrySource::kCollision, [](const std::string&) { return ""; }))),
+        history_(kinematics_) {}
+
+  void add(const std::string& joint, double q, double stamp, double now) {
+    sensor_msgs::JointState message;
+    message.header.stamp = ros::Time(stamp);
+    message.name = {joint};
+    message.position = {q};
+    history_.add(message, ros::Time(now));
+  }
+
+  std::shared_ptr<const Kinematics> kinematics_;
+  JointHistory history_;
+  const std::size_t left_ = 0;
+};
+
+TEST_F(JointHistoryTest, MeasuresVelocityUpToTheNewestPosition) {
+  add("left", 0.0, 10.0, 10.0);
+  EXPECT_TRUE(std::isnan(history_.velocity(left_, 0.05)));
+  for (int k = 1; k <= 20; ++k) add("left", 0.003 * k, 10.0 + 0.01 * k, 10.0 + 0.01 * k);
+  EXPECT_NEAR(history_.velocity(left_, 0.05), 0.3, 1e-6);
+  // Seldom ones: from the last but one.
+  add("left", 0.09, 10.3, 10.3);
+  EXPECT_NEAR(history_.velocity(left_, 0.05), 0.3, 1e-6);
+}
+
+TEST_F(JointHistoryTest, TakesStampsThatAreAheadForPresentOnes) {
+  add("left", 0.1, 10.8, 10.0);
+  add("left", 0.2, 10.9, 10.1);
+  std::vector<double> q;
+  ASSERT_TRUE(history_.at(ros::Time(10.1), &q));
+  EXPECT_EQ(q[left_], 0.2);
+  EXPECT_NE(history_.late_joint(ros::Time(10.3), 0.1), "");
+}
+
+TEST_F(JointHistoryTest, TellsOfMimicJointsThatAreNoLongerStated) {
+  add("left", 0.1, 10.0, 10.0);
+  EXPECT_EQ(history_.late_joint(ros::Time(10.0), 0.1), "");
+  add("right", 0.1, 10.0, 10.0);
+  add("left", 0.2, 11.0, 11.0);
+  EXPECT_NE(history_.late_joint(ros::Time(11.0), 0.1).find("'right'"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace ist
