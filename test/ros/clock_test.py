@@ -12,6 +12,8 @@ from joint_states_test import ARM, JointStatesTest, joint_state
 from memory_test import BALL, FAR, NEAR, VOXEL, distance_to
 from proximity_testing import LinkProximity, ProximityArray
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from velocity_filter_test import JOINTS, SLIDES, Filter
 from visualization_msgs.msg import MarkerArray
 
 
@@ -185,6 +187,24 @@ class ClockTest(unittest.TestCase):
                     self.assertTrue(pt.all_unknown(m))
         world.stop()
         self.assertEqual(node.stop(), 0)
+        clock.stop()
+
+    def test_filter_without_commands(self):
+        """The last command is from the future then, and 0 is given all the same."""
+        clock = SimulatedClock()
+        clock.start()
+        rospy.set_param("/clock_filter/robot_description", SLIDES)
+        one = Filter("/clock_filter", command_type="sensor_msgs/JointState")
+        command = JointState(name=JOINTS, velocity=[0.1, 0.0])
+        commands = pt.Repeater(50, lambda: one.publisher.publish(command))
+        pt.wait_until(lambda: one.given, "the filter")
+        commands.stop()
+        clock.jump(-50.0)
+        pt.wait_until(lambda: any("gone back" in s.status_text for s in one.states), "the jump")
+        begin = len(one.given)
+        pt.wait_until(lambda: len(one.given) > begin + 20, "velocities of 0")
+        self.assertFalse(any(np.any(m.velocity) for m in one.given))
+        self.assertEqual(one.stop(), 0)
         clock.stop()
 
 
