@@ -171,6 +171,7 @@ struct VelocityFilter::Impl {
 
   // Whether the velocity x meets the rows, to rounding.
   bool is_met(const ConstraintRows& rows) const {
+    if (!x.allFinite()) return false;  // commands may be as large as numbers are
     const double slack = kNegligible * (1.0 + x.lpNorm<1>());
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows.count); ++i) {
       double approach = 0.0, sweep = 0.0;
