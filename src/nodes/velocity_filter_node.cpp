@@ -29,7 +29,6 @@ int main(int argc, char** argv) {
     ROS_FATAL_STREAM("velocity_filter_node cannot start:\n" << error.what());
     return 1;
   }
-  ros::WallDuration(0.1).sleep();  // in which the last message leaves
   ros::shutdown();
   return 0;
 }

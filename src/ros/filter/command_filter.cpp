@@ -24,6 +24,9 @@ using ist_proximity::FilterState;
 constexpr double kNegligible = 1e-8;
 // [s] Over which the speed of joints that are not commanded is measured.
 constexpr double kSpeedWindow = 0.05;
+// Time in which the last velocity leaves: roscpp sends by another thread, and drops what a
+// publisher has not sent when it goes.
+const ros::WallDuration kLeave(0.1);
 
 FilterConfig read_config(const ros::NodeHandle& private_nh) {
   XmlRpc::XmlRpcValue tree;
@@ -90,6 +93,7 @@ CommandFilter::~CommandFilter() {
   command_.shutdown();
   publish_scale(0.0, scale_);
   if (halt_) halt_("the filter ends");
+  kLeave.sleep();
 }
 
 template <class Message>
