@@ -415,8 +415,8 @@ void CommandFilter::note_given(const FilterState& state) {
   }
 }
 
-/// What the given velocities have used, since the joints were stated, comes off what points of a
-/// link may move: these were other ones than the present one.
+/// The way that velocities have used which were given since the joints were stated comes off what
+/// points of a link may move: these were other velocities than the present one.
 void CommandFilter::take_off_given(const ros::Time& now, double horizon) {
   const double age = history_->age(now);
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(rows_.sweep.cols());

@@ -23,16 +23,16 @@ struct JointCommand {
   std::vector<std::string> joints;  ///< by name, in the message's order
   std::vector<double> velocity;  ///< by joint; NaN where the message states none that can be used
   std::string fault;             ///< a sentence: why it cannot be used; empty: it can
-  /// Of a twist: linear [m/s] over angular velocity [rad/s] of the tool in the twist's frame, by
-  /// joint. Else empty.
+  /// The tool's linear [m/s] over angular velocity [rad/s] in a twist's frame, by joint. Empty
+  /// where the command is no twist.
   Eigen::MatrixXd jacobian;
 };
 
-/// What commands are read with.
+/// All that commands are read with, besides the message.
 struct CommandReader {
   std::vector<std::string> joints;  ///< of a message that names none
   JointPositionOf q;
-  // Of twists alone.
+  // The rest is read for twists alone.
   std::shared_ptr<const Kinematics> kinematics;  ///< null: not known yet, and no twist is read
   std::string tool;                              ///< link that a twist moves; empty: its frame
   ros::Time now;

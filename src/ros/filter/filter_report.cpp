@@ -1,4 +1,4 @@
-// What CommandFilter tells of an answer, as a message and as markers.
+// An answer of CommandFilter as a message and as markers.
 
 #include <algorithm>
 #include <cmath>
