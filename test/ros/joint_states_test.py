@@ -10,6 +10,7 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
+from ist_proximity.msg import SpeedScaleState
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import JointState, PointCloud2
 
@@ -212,10 +213,21 @@ class JointStatesTest(unittest.TestCase):
 
         # Where a joint is stated that the URDF lacks, another one has not its deceleration.
         self.assertEqual(node.stop(), 0)
-        node = self.start(max_distance=3.0, joint_deceleration={**deceleration, "glide": 1.0})
+        scales = []
+        topic = self.namespace + "/proximity/speed_scale_state"
+        subscriber = rospy.Subscriber(topic, SpeedScaleState, scales.append)
+        node = self.start(
+            max_distance=3.0,
+            joint_deceleration={**deceleration, "glide": 1.0},
+            speed_scale={"separation": {"enabled": True}},
+        )
         node.wait_for_status(ProximityArray.DEGRADED, "joint_deceleration names 'glide'")
         ball = pt.link(node.messages[-1], "ball_link")
         self.assertEqual((ball.state, ball.robot_future), (LinkProximity.NEAR, -np.inf))
+        told = "how far a link goes until it stands is not known"
+        pt.wait_until(lambda: scales and told in scales[-1].text, "the scale's reason")
+        self.assertEqual(scales[-1].scale, 0.0)
+        subscriber.unregister()
 
     def test_stated_mimic(self):
         """A mimic joint is where it is stated, as with robot_state_publisher, or else follows."""

@@ -20,7 +20,7 @@ struct PlacedAnswers {
   std::vector<double> q;  ///< [rad, m] by joint of the kinematics, at the message's stamp
 };
 
-/// What a row rests on.
+/// The distance that a row rests on.
 struct RowAnswer {
   std::string link;
   std::string source;          ///< of the nearest obstacle; of a pair, the other link
@@ -52,7 +52,7 @@ class ProximityRows {
                              const std::vector<double>& q_now, const RowConfig& config,
                              double self_stop_distance);
 
-  /// Where a row of the last rows() comes from.
+  /// The origin of a row of the last rows().
   RowAnswer answer(const RowOrigin& origin) const;
   const std::vector<std::size_t>& joints() const { return builder_->joints(); }  ///< by column
 

@@ -13,7 +13,7 @@
 
 namespace ist {
 
-/// Where a joint is now and how fast it moves; NaN where that is not known.
+/// A joint's position and velocity now; NaN where they are not known.
 struct JointMotionNow {
   double q, dq;  ///< [rad, m], [rad/s, m/s]
 };
@@ -26,7 +26,7 @@ struct WatchedTrajectory {
   StraightPieces pieces;
 
   double end() const { return pieces.times.back(); }  ///< [s]
-  /// Where it has the joints that it moves at a time [s].
+  /// The positions of the joints that it moves, at a time [s].
   sensor_msgs::JointState state(const Kinematics& kinematics, double time) const;
 };
 
