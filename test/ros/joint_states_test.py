@@ -10,7 +10,6 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
-from ist_proximity.msg import SpeedScaleState
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import JointState, PointCloud2
 
@@ -173,61 +172,6 @@ class JointStatesTest(unittest.TestCase):
         node.wait_for_status(ProximityArray.OK)
         self.assertEqual(node.diagnostic("pose", "topic"), self.namespace + "/joint_states")
         self.assertGreater(int(node.diagnostic("pose", "joint states used")), 100)
-
-    def test_robot_future(self):
-        """What links can still sweep comes off their bounds; without velocities it is not known."""
-        deceleration = {"default": 0.5, "slide": 2.0}
-        node = self.start(max_distance=3.0, joint_deceleration=deceleration)
-        points = np.array([[0.6, 0.6, 0.6]])  # in base
-        self.world.repeat(20, lambda: self.world.cloud_publisher.publish(pt.cloud(points, "base")))
-        q, velocities = {"turn": 0.3, "slide": 0.5}, [-0.4, 0.6]
-        self.world.repeat(
-            100, lambda: self.publisher.publish(joint_state(q, velocities=velocities))
-        )
-        node.wait_for_status(ProximityArray.OK)
-        turned, slid = 0.4**2 / (2 * 0.5), 0.6**2 / (2 * 2.0)  # [rad, m]
-        lever = {  # [m] of the farthest point of the link's box from the column's axis
-            "ball_link": np.hypot(0.5 + 0.1, 0.1),
-            "box_link": np.hypot(-1.5 * 0.5 - 0.5 + 0.05 - 0.1, 0.2),
-        }
-        for name, way in (("ball_link", slid), ("box_link", 1.5 * slid)):
-            one = pt.link(node.messages[-1], name)
-            reach = lever[name] * turned + way
-            self.assertAlmostEqual(one.lower_bound - one.robot_future, reach, delta=1e-4)
-
-        velocities[:] = [0.0, 0.0]  # the robot stands
-        node.wait_for(
-            lambda m: pt.link(m, "ball_link").robot_future == pt.link(m, "ball_link").lower_bound,
-            "a robot that stands",
-        )
-        for unknown in ([np.nan, 0.0], []):
-            velocities[:] = unknown
-            node.wait_for(
-                lambda m: pt.link(m, "ball_link").robot_future == -np.inf, "an unknown velocity"
-            )
-            self.assertEqual(pt.link(node.messages[-1], "ball_link").state, LinkProximity.NEAR)
-            velocities[:] = [0.1, 0.0]
-            node.wait_for(
-                lambda m: pt.link(m, "ball_link").robot_future > -1.0, "a velocity that is known"
-            )
-
-        # Where a joint is stated that the URDF lacks, another one has not its deceleration.
-        self.assertEqual(node.stop(), 0)
-        scales = []
-        topic = self.namespace + "/proximity/speed_scale_state"
-        subscriber = rospy.Subscriber(topic, SpeedScaleState, scales.append)
-        node = self.start(
-            max_distance=3.0,
-            joint_deceleration={**deceleration, "glide": 1.0},
-            speed_scale={"separation": {"enabled": True}},
-        )
-        node.wait_for_status(ProximityArray.DEGRADED, "joint_deceleration names 'glide'")
-        ball = pt.link(node.messages[-1], "ball_link")
-        self.assertEqual((ball.state, ball.robot_future), (LinkProximity.NEAR, -np.inf))
-        told = "how far a link goes until it stands is not known"
-        pt.wait_until(lambda: scales and told in scales[-1].text, "the scale's reason")
-        self.assertEqual(scales[-1].scale, 0.0)
-        subscriber.unregister()
 
     def test_stated_mimic(self):
         """A mimic joint is where it is stated, as with robot_state_publisher, or else follows."""
