@@ -54,7 +54,10 @@ def wall():
 
 
 class Filter:
-    """The nodelet in a process of its own."""
+    """The node, or another program that has the filter, in a process of its own."""
+
+    program = ("ist_proximity", "velocity_filter_node")
+    arguments = []
 
     def __init__(self, namespace, **parameters):
         self.name = namespace + "/filter"
@@ -71,13 +74,16 @@ class Filter:
         self.publisher = rospy.Publisher(self.name + "/command", self.kind, queue_size=1)
         self._log = tempfile.TemporaryFile()
         self.process = subprocess.Popen(
-            [pt.find_program("ist_proximity", "velocity_filter_node")]
+            [pt.find_program(*self.program), *self.arguments]
             + ["__ns:=" + namespace, "__name:=filter"]
             + ["/tf:=" + namespace + "/tf", "/tf_static:=" + namespace + "/tf_static"],
             stdout=self._log,
             stderr=subprocess.STDOUT,
         )
         pt.wait_until(lambda: self.publisher.get_num_connections() == 1, "the filter")
+
+    def is_heard(self):
+        return all(subscriber.get_num_connections() > 0 for subscriber in self._subscribers)
 
     def stop(self):
         for subscriber in self._subscribers:
