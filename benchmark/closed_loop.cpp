@@ -7,6 +7,8 @@
 // Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--only "velocity
 // filter"]
 //                    [--update-doc doc/benchmark.md]
+//        closed_loop --filter-runs 30000 [--update-doc doc/benchmark.md]
+// The second one measures how long the filter takes.
 
 #include <algorithm>
 #include <array>
@@ -17,6 +19,7 @@
 
 #include "closed_loop.h"
 #include "document.h"
+#include "filter_time.h"
 #include "hidden_scene.h"
 #include "support.h"
 #include "support/demo_arm.h"
@@ -144,7 +147,14 @@ int main(int argc, char** argv) {
   const auto threads = arguments.count("threads", 1);
   const double noise = 1e-3 * arguments.number("noise", -1.0);  // [m] negative: the cameras' own
   const std::string only = arguments.text("only"), document = arguments.text("update-doc");
+  const auto filter_runs = arguments.count("filter-runs", 0);
   arguments.rest();
+  if (filter_runs > 0) {
+    const std::string text = ist::benchmark::filter_time(filter_runs);
+    std::printf("%s", text.c_str());
+    if (document.empty()) return 0;
+    return ist::benchmark::write_table(document, "filter time", text) ? 0 : 1;
+  }
   const ist::RobotDescription robot = ist::test::demo_robot();
   const auto model = ist::build_robot_model(robot, {});
   std::vector<SceneResult> results(count);

@@ -19,19 +19,21 @@
 #include "ist_proximity/proximity/joint_trajectory.h"
 #include "ist_proximity/proximity/time_of_impact.h"
 #include "ist_proximity/robot/link_poses.h"
+#include "random_trajectory.h"
 #include "support.h"
-#include "support/demo_arm.h"
 
 namespace {
 
 using Eigen::Vector3d;
-using ist::JointTrajectory;
 using ist::StraightPieces;
-using Random = std::mt19937_64;
+using ist::benchmark::Arm;
+using ist::benchmark::kDuration;
+using ist::benchmark::Random;
+using ist::benchmark::random_trajectory;
+using ist::benchmark::uniform;
 
 constexpr double kPeriod = 1.0 / 30.0;      // [s] of the clouds
 constexpr double kDelay = kPeriod + 0.010;  // [s] from a cloud's stamp until its answer counts
-constexpr double kDuration = 5.0;           // [s] of a trajectory
 constexpr double kDeceleration = 10.0;      // [rad/s^2, m/s^2]
 constexpr double kFastest = 3.0;            // [m/s] of a ball
 constexpr double kSeen = 1.5;               // [m] farther obstacles are not looked for
@@ -39,43 +41,6 @@ constexpr double kMargin = 0.01;            // [m] for what is between the point
 constexpr double kRadius = 0.1;             // [m] of a ball
 constexpr double kWall = 2.5;               // [m] the distance of the wall behind it
 constexpr double kInf = std::numeric_limits<double>::infinity();
-
-double uniform(Random* random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(*random);
-}
-
-struct Arm {
-  ist::RobotDescription description = ist::test::demo_robot();
-  std::shared_ptr<const ist::RobotModel> model = ist::test::demo_model();
-  std::shared_ptr<const ist::Kinematics> kinematics =
-      std::make_shared<ist::Kinematics>(description);
-  std::vector<bool> moves = ist::links_that_move(*model, *kinematics, kinematics->bodies().front());
-};
-
-// Six positions, between which joints move along cubic polynomials.
-JointTrajectory random_trajectory(const Arm& arm, Random* random) {
-  constexpr std::size_t kPoints = 6;
-  const auto& joints = arm.kinematics->joints();
-  JointTrajectory path;
-  path.positions.assign(kPoints, std::vector<double>(joints.size(), std::nan("")));
-  path.velocities = path.positions;
-  const double step = kDuration / (kPoints - 1);
-  for (std::size_t k = 0; k < kPoints; ++k) path.times.push_back(step * static_cast<double>(k));
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (!joints[j].is_free()) continue;
-    const double low = std::max(joints[j].lower, -1.5), high = std::min(joints[j].upper, 1.5);
-    for (std::size_t k = 0; k < kPoints; ++k) {
-      const double before = k == 0 ? uniform(random, low, high) : path.positions[k - 1][j];
-      path.positions[k][j] = std::clamp(before + uniform(random, -0.8, 0.8), low, high);
-    }
-    for (std::size_t k = 0; k < kPoints; ++k) {
-      const bool is_end = k == 0 || k + 1 == kPoints;
-      path.velocities[k][j] =
-          is_end ? 0.0 : (path.positions[k + 1][j] - path.positions[k - 1][j]) / (2.0 * step);
-    }
-  }
-  return path;
-}
 
 // Flies straight on, and is seen from `begin` on.
 struct Ball {

@@ -155,6 +155,8 @@ if(catkin_FOUND)
       OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
     add_dependencies(benchmarks benchmark_${name})
   endforeach()
+  target_sources(benchmark_reaction PRIVATE benchmark/ros/latency/traffic.cpp)
+  target_link_libraries(benchmark_reaction PRIVATE ist_proximity_simulator)
   target_sources(benchmark_cycle PRIVATE
     benchmark/peers/kinect.cpp
     benchmark/peers/scene.cpp

@@ -1,7 +1,6 @@
 #include "ros/latency/traffic.h"
 
 #include <sensor_msgs/JointState.h>
-#include <tf2_msgs/TFMessage.h>
 
 #include <boost/make_shared.hpp>
 #include <cmath>
@@ -17,7 +16,6 @@ namespace ist::benchmark {
 namespace {
 
 constexpr std::uint32_t kWidth = 640, kHeight = 480;
-constexpr double kStateRate = 1000.0, kCloudRate = 30.0;  // [Hz]
 constexpr char kCameraFrame[] = "latency_camera";
 
 std::vector<Eigen::Vector3f> wavy_wall() {
@@ -32,10 +30,29 @@ std::vector<Eigen::Vector3f> wavy_wall() {
   return points;
 }
 
-sensor_msgs::PointCloud2 make_cloud(const std::string& pcd) {
+std::vector<Eigen::Vector3f> points_of(const std::string& pcd) {
   std::vector<Eigen::Vector3f> points;
   if (!pcd.empty()) points = test::read_pcd(pcd);
-  if (points.empty()) points = wavy_wall();
+  return points.empty() ? wavy_wall() : points;
+}
+
+/// Joint positions: all free joints swing about the middle of their ranges, at about 1 rad/s.
+std::vector<double> positions_at(const Kinematics& kinematics, double t) {
+  std::vector<double> positions;
+  for (std::size_t j = 0; j < kinematics.joints().size(); ++j) {
+    const Kinematics::Joint& joint = kinematics.joints()[j];
+    if (!joint.is_free()) continue;
+    const bool limited = std::isfinite(joint.lower) && std::isfinite(joint.upper);
+    const double middle = limited ? 0.5 * (joint.lower + joint.upper) : 0.0;
+    const double swing = limited ? std::min(0.5, 0.4 * (joint.upper - joint.lower)) : 0.5;
+    positions.push_back(middle + swing * std::sin(2.0 * t + static_cast<double>(j)));
+  }
+  return positions;
+}
+
+}  // namespace
+
+sensor_msgs::PointCloud2 make_cloud(const std::vector<Eigen::Vector3f>& points) {
   sensor_msgs::PointCloud2 cloud;
   cloud.header.frame_id = kCameraFrame;
   cloud.width = kWidth;
@@ -57,31 +74,23 @@ sensor_msgs::PointCloud2 make_cloud(const std::string& pcd) {
   return cloud;
 }
 
-/// Joint positions: all free joints swing about the middle of their ranges, at about 1 rad/s.
-std::vector<double> positions_at(const Kinematics& kinematics, double t) {
-  std::vector<double> positions;
-  for (std::size_t j = 0; j < kinematics.joints().size(); ++j) {
-    const Kinematics::Joint& joint = kinematics.joints()[j];
-    if (!joint.is_free()) continue;
-    const bool limited = std::isfinite(joint.lower) && std::isfinite(joint.upper);
-    const double middle = limited ? 0.5 * (joint.lower + joint.upper) : 0.0;
-    const double swing = limited ? std::min(0.5, 0.4 * (joint.upper - joint.lower)) : 0.5;
-    positions.push_back(middle + swing * std::sin(2.0 * t + static_cast<double>(j)));
-  }
-  return positions;
+tf2_msgs::TFMessage camera_pose(const std::string& root, const Eigen::Isometry3d& X_RS) {
+  const Eigen::Quaterniond q(X_RS.linear());
+  tf2_msgs::TFMessage message;
+  message.transforms.resize(1);
+  auto& transform = message.transforms[0];
+  transform.header.stamp = ros::Time::now();
+  transform.header.frame_id = root;
+  transform.child_frame_id = kCameraFrame;
+  transform.transform.rotation.x = q.x();
+  transform.transform.rotation.y = q.y();
+  transform.transform.rotation.z = q.z();
+  transform.transform.rotation.w = q.w();
+  transform.transform.translation.x = X_RS(0, 3);
+  transform.transform.translation.y = X_RS(1, 3);
+  transform.transform.translation.z = X_RS(2, 3);
+  return message;
 }
-
-template <typename Send>
-void repeat(double rate, const std::atomic<bool>& go_on, const Send& send) {
-  const auto period =
-      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate));
-  for (auto next = Clock::now(); go_on; next = std::max(next + period, Clock::now() - period)) {
-    std::this_thread::sleep_until(next);
-    send();
-  }
-}
-
-}  // namespace
 
 Traffic::Traffic(const Kinematics& kinematics, const std::string& pcd, const std::string& camera,
                  OnSend on_state, OnSend on_cloud)
@@ -93,7 +102,7 @@ Traffic::Traffic(const Kinematics& kinematics, const std::string& pcd, const std
     name_thread("states");
     repeat(kStateRate, go_on_, [this] { send_state(); });
   });
-  cloud_thread_ = std::thread([this, content = make_cloud(pcd)] {
+  cloud_thread_ = std::thread([this, content = make_cloud(points_of(pcd))] {
     name_thread("clouds");
     repeat(kCloudRate, go_on_, [&] { send_cloud(content); });
   });
@@ -111,22 +120,8 @@ void Traffic::place_camera(const std::string& file) {
     std::ifstream numbers(file);
     for (int i = 0; i < 16; ++i) numbers >> X_RS(i / 4, i % 4);
   }
-  const Eigen::Quaterniond q(X_RS.topLeftCorner<3, 3>());
-  tf2_msgs::TFMessage message;
-  message.transforms.resize(1);
-  auto& transform = message.transforms[0];
-  transform.header.stamp = ros::Time::now();
-  transform.header.frame_id = kinematics_.bodies().front();
-  transform.child_frame_id = kCameraFrame;
-  transform.transform.rotation.x = q.x();
-  transform.transform.rotation.y = q.y();
-  transform.transform.rotation.z = q.z();
-  transform.transform.rotation.w = q.w();
-  transform.transform.translation.x = X_RS(0, 3);
-  transform.transform.translation.y = X_RS(1, 3);
-  transform.transform.translation.z = X_RS(2, 3);
   static_tf_ = nh_.advertise<tf2_msgs::TFMessage>("/tf_static", 1, true);
-  static_tf_.publish(message);
+  static_tf_.publish(camera_pose(kinematics_.bodies().front(), Eigen::Isometry3d(X_RS)));
 }
 
 void Traffic::send_state() {

@@ -3,15 +3,40 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <sensor_msgs/PointCloud2.h>
+#include <tf2_msgs/TFMessage.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
+#include "support.h"
 
 namespace ist::benchmark {
+
+constexpr double kStateRate = 1000.0, kCloudRate = 30.0;  // [Hz]
+
+/// An organized image of 640 columns in the camera's frame, without a stamp.
+sensor_msgs::PointCloud2 make_cloud(const std::vector<Eigen::Vector3f>& points);
+
+/// Where the camera stands: sensor -> root link.
+tf2_msgs::TFMessage camera_pose(const std::string& root, const Eigen::Isometry3d& X_RS);
+
+/// Calls `send` at a rate [Hz] while `go_on` holds.
+template <typename Send>
+void repeat(double rate, const std::atomic<bool>& go_on, const Send& send) {
+  const auto period =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate));
+  for (auto next = Clock::now(); go_on; next = std::max(next + period, Clock::now() - period)) {
+    std::this_thread::sleep_until(next);
+    send();
+  }
+}
 
 /// Messages of a robot and its camera: joint states at 1 kHz on `joint_states`, an organized
 /// 640x480 cloud at 30 Hz on `cloud`, each from its own thread, and the camera's pose.
