@@ -109,8 +109,7 @@ struct Brake {
 };
 
 // The watch of one trajectory. Its times count from the trajectory's begin.
-Brake watch(const Arm& arm, const StraightPieces& pieces, const Ball& ball, double first_stamp,
-            std::vector<double>* reactions) {
+Brake watch(const Arm& arm, const StraightPieces& pieces, const Ball& ball, double first_stamp) {
   static const std::vector<float> wall = wall_image();
   ist::QueryConfig config;
   config.max_distance = kSeen;
@@ -126,7 +125,6 @@ Brake watch(const Arm& arm, const StraightPieces& pieces, const Ball& ball, doub
     if (brake.begin <= now) return brake;  // before this answer
     std::vector<Vector3d> points;
     if (ball.is_there(stamp)) points = ball_points(ball.at(stamp));
-    ist::benchmark::ThreadTimer timer;
     const auto image = ist::Obstacles::from_image(wall.data(), 640, 480);
     const ist::Obstacles seen(points);
     const double delay = ist::braking_way(pieces, now, kDuration, decelerations);
@@ -142,7 +140,6 @@ Brake watch(const Arm& arm, const StraightPieces& pieces, const Ball& ball, doub
       brake.way = ist::braking_way(pieces, now, contact, decelerations);
       brake.begin = std::max(now, contact - brake.way);
     }
-    reactions->push_back(1e-3 * timer.lap());
   }
   return brake;
 }
@@ -185,8 +182,7 @@ Contact first_contact(const Arm& arm, const StraightPieces& pieces, const Ball& 
 
 struct Totals {
   int would_touch = 0, moving = 0, stopped = 0, unneeded = 0;
-  std::vector<double> missed;     // [mm] by which a ball would have missed, of unneeded stops
-  std::vector<double> reactions;  // [ms]
+  std::vector<double> missed;  // [mm] by which a ball would have missed, of unneeded stops
 };
 
 void run_seed(const Arm& arm, std::uint64_t seed, Totals* totals) {
@@ -194,7 +190,7 @@ void run_seed(const Arm& arm, std::uint64_t seed, Totals* totals) {
   const StraightPieces pieces = ist::straight_pieces(random_trajectory(arm, &random));
   const Ball ball = random_ball(arm, pieces, &random);
   const double first_stamp = uniform(&random, -kPeriod, 0.0);
-  const Brake brake = watch(arm, pieces, ball, first_stamp, &totals->reactions);
+  const Brake brake = watch(arm, pieces, ball, first_stamp);
   const Contact unwatched = first_contact(arm, pieces, ball, Brake(), kDuration);
   const Contact watched = first_contact(arm, pieces, ball, brake, kDuration + 1.0);
   const bool touches = unwatched.time < kInf, stops = brake.begin < kInf;
@@ -214,11 +210,9 @@ std::string text_of(std::size_t count, const Totals& totals) {
   std::snprintf(
       text.data(), text.size(),
       "Of %zu balls %d would touch; %d touched the moving arm. It stopped %d times, %d times "
-      "for a ball that\nwould have missed, by %.0f mm in the median. Ingest and decision "
-      "took %.1f ms, %.1f ms at the 99th\npercentile.\n",
+      "for a ball that\nwould have missed, by %.0f mm in the median.\n",
       count, totals.would_touch, totals.moving, totals.stopped, totals.unneeded,
-      quantile(totals.missed, 0.5), quantile(totals.reactions, 0.5),
-      quantile(totals.reactions, 0.99));
+      quantile(totals.missed, 0.5));
   return text.data();
 }
 

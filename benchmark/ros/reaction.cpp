@@ -96,12 +96,11 @@ void run_seed(const Arm& arm, std::uint64_t seed, World* world, Totals* totals) 
 std::string text_of(const Totals& totals) {
   std::array<char, 256> text{};
   const std::vector<double>& times = totals.times;
-  std::snprintf(
-      text.data(), text.size(),
-      "Through the node the goal is cancelled %.0f ms after the cloud's stamp, %.0f ms at the "
-      "99th percentile, %.0f ms\nat most, where braking is due at once: %zu of %zu balls.\n",
-      quantile(times, 0.5), quantile(times, 0.99), quantile(times, 1.0), times.size(),
-      totals.balls);
+  std::snprintf(text.data(), text.size(),
+                "%.0f / %.0f / %.0f ms (median, p99, largest) from the cloud's stamp to the "
+                "cancelled goal, where\nbraking is due at once (%zu of %zu balls).\n",
+                quantile(times, 0.5), quantile(times, 0.99), quantile(times, 1.0), times.size(),
+                totals.balls);
   return text.data();
 }
 
