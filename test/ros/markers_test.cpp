@@ -38,6 +38,7 @@ Link link(const std::string& name, double distance, double x = 0.0) {
   one.point_on_link.x = one.point_on_obstacle.x = x;
   one.point_on_obstacle.z = -distance;
   one.repulsion.z = 0.5;
+  one.robot_future = kNaN;
   return one;
 }
 
@@ -134,6 +135,17 @@ TEST(ProximityMarkers, LabelsAreAListAboveTheRobot) {
       free = top - kLabelHeight;
     }
   }
+}
+
+TEST(ProximityMarkers, WhatIsLeftUntilTheRobotStands) {
+  ProximityMarkers drawer(1.0, 1.0);
+  std::vector<Link> links = {link("a", 0.2), link("b", 0.2), link("c", 0.2)};
+  links[0].robot_future = -0.05;
+  links[1].robot_future = -kInf;
+  auto drawn = by_key(drawer.draw(array(links), {}));
+  EXPECT_EQ((drawn[{"text", 0}].text), "a 0.200 m, -0.050 m until it stands");
+  EXPECT_EQ((drawn[{"text", 1}].text), "b 0.200 m, NOT KNOWN until it stands");
+  EXPECT_EQ((drawn[{"text", 2}].text), "c 0.200 m");
 }
 
 TEST(ProximityMarkers, NamespacesAndIds) {

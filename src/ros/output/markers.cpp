@@ -118,6 +118,11 @@ void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links,
     const double below = kGap + (static_cast<double>(row) + 0.5) * kRow;
     assign(list_position_ - Eigen::Vector3d(0, 0, below), &text.pose.position);
     text.text = link.link + format_text(" %.3f m", link.distance);
+    if (std::isfinite(link.robot_future)) {
+      text.text += format_text(", %.3f m until it stands", link.robot_future);
+    } else if (!std::isnan(link.robot_future)) {
+      text.text += ", NOT KNOWN until it stands";
+    }
     markers->push_back(text);
   }
 }

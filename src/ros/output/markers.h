@@ -28,8 +28,8 @@ struct MarkerScene {
 
 /// Draws a ProximityArray for rviz, in its own frame. Namespaces: "distance" (line from obstacle to
 /// link), "point_on_link", "point_on_obstacle", "repulsion" (violet arrow) and "text" (name and
-/// distance of the nearest links within 0.3 m), "unseen" (grey line from a link to the nearest
-/// unknown space); the id is the link's place in the array.
+/// distance of the nearest links within 0.3 m, and robot_future where it is stated), "unseen" (grey
+/// line from a link to the nearest unknown space); the id is the link's place in the array.
 /// "nearest" has the ids 0 (the nearest link's distance as a large number, or why it is not known),
 /// 1 and 2 (its line and its point, highlighted). The number and below it the labels, the nearest
 /// first, are a list above the robot: none lies over another or over the robot in a view from the
