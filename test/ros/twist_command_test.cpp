@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/SVD>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/robot/robot_description.h"
 #include "ros/common/eigen_conversion.h"
 #include "ros/filter/command_message.h"
 #include "support/control_robots.h"
@@ -157,6 +159,49 @@ TEST_F(TwistCommand, ThatCannotBeUsedIsTold) {
   expect_fault(message_of("base_link", twist), "no joint moves 'base_link'");
   reader_.q = [](const std::string&) { return std::nan(""); };
   expect_fault(message_of(kTool, twist), "does not follow from the joint states");
+}
+
+// A base that slides along x and y, and turns.
+TEST(BaseCommand, IsOfTheBaseInItsOwnAxes) {
+  std::string urdf = "<robot name='base'><link name='odom'/>";
+  std::string parent = "odom";
+  for (const auto& [joint, type, axis] :
+       {std::array{"x", "prismatic", "1 0 0"}, std::array{"y", "prismatic", "0 1 0"},
+        std::array{"turn", "continuous", "0 0 1"}}) {
+    const std::string link = std::string("after_") + joint;
+    urdf += "<link name='" + link + "'/><joint name='" + joint + "' type='" + type +
+            "'><parent link='" + parent + "'/><child link='" + link + "'/><axis xyz='" + axis +
+            "'/><limit lower='-9' upper='9' velocity='1' effort='1'/></joint>";
+    parent = link;
+  }
+  const auto no_packages = [](const std::string&) { return std::string(); };
+  CommandReader reader;
+  reader.joints = {"x", "y", "turn"};
+  reader.q = [](const std::string& joint) { return joint == "turn" ? 1.1 : 2.0; };
+  reader.kinematics = std::make_shared<const Kinematics>(
+      parse_urdf(urdf + "</robot>", GeometrySource::kCollision, no_packages));
+  reader.tool = "after_turn";
+  reader.now = ros::Time(kNow);
+  reader.timeout = 0.1;
+  geometry_msgs::Twist message;
+  message.linear.x = 0.4;
+  message.linear.y = 0.1;
+  message.angular.z = 0.3;
+  const JointCommand command = read_command(message, reader);
+  ASSERT_EQ(command.fault, "");
+  EXPECT_TRUE(command.keeps_way);
+  EXPECT_EQ(command.joints, reader.joints);
+  EXPECT_NEAR(command.velocity[0], 0.4 * std::cos(1.1) - 0.1 * std::sin(1.1), 1e-12);
+  EXPECT_NEAR(command.velocity[1], 0.4 * std::sin(1.1) + 0.1 * std::cos(1.1), 1e-12);
+  EXPECT_NEAR(command.velocity[2], 0.3, 1e-12);
+  std::vector<double> half = command.velocity;
+  for (double& v : half) v *= 0.5;
+  set_velocity(command, half, reader.q, &message);
+  EXPECT_NEAR(message.linear.x, 0.2, 1e-12);
+  EXPECT_NEAR(message.linear.y, 0.05, 1e-12);
+  EXPECT_NEAR(message.angular.z, 0.15, 1e-12);
+  message.linear.z = 0.1;
+  EXPECT_NE(read_command(message, reader).fault.find("cannot move so"), std::string::npos);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
-from geometry_msgs.msg import TwistStamped, Vector3
+from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from ist_proximity.msg import FilterState
 from ist_proximity.srv import IgnoreLinks
 from proximity_testing import ProximityArray
@@ -33,6 +33,12 @@ SLIDES = """<robot name="slides">
 POST = """  <link name="post"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
   <joint name="to_post" type="fixed"><parent link="base"/><child link="post"/>
     <origin xyz="0 0.5 0"/></joint>
+</robot>"""
+
+# The ball as a mobile base, whose front looks along y.
+BASE = """  <link name="base_link"/>
+  <joint name="to_front" type="fixed"><parent link="ball"/><child link="base_link"/>
+    <origin rpy="0 0 1.5707963267948966"/></joint>
 </robot>"""
 
 # Both joints slide along x; the first one alone moves what comes to the wall.
@@ -64,7 +70,7 @@ class Filter:
         self.states, self.given, self.scales = [], [], []
         for name, value in parameters.items():
             rospy.set_param(self.name + "/" + name, value)
-        kinds = {kind._type: kind for kind in (Float64MultiArray, JointState, TwistStamped)}
+        kinds = {kind._type: kind for kind in (Float64MultiArray, JointState, Twist, TwistStamped)}
         self.kind = kinds.get(parameters.get("command_type"), JointTrajectory)
         self._subscribers = [
             rospy.Subscriber(self.name + "/filter_state", FilterState, self.states.append),
@@ -109,6 +115,8 @@ class VelocityFilterTest(unittest.TestCase):
         self.robot = self.world.repeat(1.0 / PERIOD, self.move)
         has_post = "post" in self._testMethodName
         robot = REDUNDANT if "redundant" in self._testMethodName else SLIDES
+        if "base" in self._testMethodName:
+            robot = robot.replace("</robot>", BASE)
         self.node = pt.ProximityNode(
             self.namespace,
             {
@@ -145,6 +153,8 @@ class VelocityFilterTest(unittest.TestCase):
             return np.array(message.points[0].velocities)
         if isinstance(message, TwistStamped):  # of a ball on two slides
             return np.array([message.twist.linear.x, message.twist.linear.y])
+        if isinstance(message, Twist):  # of BASE
+            return np.array([-message.linear.y, message.linear.x])
         return np.array(message.data if isinstance(message, Float64MultiArray) else message.velocity)
 
     def command(self, *velocity):
@@ -158,6 +168,8 @@ class VelocityFilterTest(unittest.TestCase):
             message = TwistStamped()
             message.header.frame_id, message.header.stamp = "ball", rospy.Time.now()
             message.twist.linear = Vector3(*velocity, *[0.0] * (3 - len(velocity)))
+        elif self.filter.kind is Twist:
+            message = Twist(Vector3(*velocity[:2], 0.0), Vector3(0.0, 0.0, sum(velocity[2:])))
         else:
             message = Float64MultiArray(data=velocity)
         self.filter.publisher.publish(message)
@@ -301,6 +313,29 @@ class VelocityFilterTest(unittest.TestCase):
         state = self.wait_for(FilterState.FREE)
         np.testing.assert_allclose(state.velocity, [-0.05, -0.05], atol=1e-9)
         self.assertAlmostEqual(self.filter.given[-1].twist.linear.x, -0.1, 9)
+
+    def test_twist_of_a_base(self):
+        """What is commanded to the wall at a slant is slowed down to 0 and goes not along it."""
+        self.start(0.1, -0.5, command_type="geometry_msgs/Twist", tool="base_link")
+        state = self.wait_for(FilterState.SCALED)
+        self.assertEqual(state.links, ["ball"])
+        np.testing.assert_allclose(state.command, [0.5, 0.1], atol=1e-9)
+        begin = len(self.filter.given)
+        pt.wait_until(lambda: np.linalg.norm(self.velocity) < 0.01, "the base to stand")
+        self.assertGreaterEqual(self.nearest, STOP - 0.005)
+        for given in self.filter.given[begin:]:
+            self.assertAlmostEqual(given.linear.y, -5.0 * given.linear.x, 9)
+            self.assertFalse(np.any([given.linear.z, given.angular.z]))
+        self.wanted = (0.0, 0.3)
+        self.wait_for(FilterState.FREE)
+        pt.wait_until(lambda: np.allclose(self.velocity, [-0.3, 0.0], atol=1e-9), "the retreat")
+        self.wanted = (0.0, 0.3, 0.1)
+        self.check_fault("'base_link' cannot move so")
+        self.wanted = (np.nan, 0.0)
+        self.check_fault("not a finite number")
+        self.commands.paused = True
+        self.check_fault("the last command came")
+        pt.wait_until(lambda: not np.any(self.velocity), "0 after a timeout")
 
     def test_started_inside_the_stop_distance(self):
         self.q = np.array([WALL - RADIUS - 0.02, 0.0])
@@ -511,8 +546,12 @@ class VelocityFilterTest(unittest.TestCase):
             publish.stop()
 
     def test_wrong_parameters_are_refused(self):
-        rospy.set_param(self.namespace + "/filter/margin", -1.0)
-        rospy.set_param(self.namespace + "/filter/command_type", "Twist")
+        self.check_refused({"margin": -1.0, "command_type": "Twist"}, ["~margin", "~command_type"])
+        self.check_refused({"margin": 0.01, "command_type": "geometry_msgs/Twist"}, ["~tool is empty"])
+
+    def check_refused(self, parameters, texts):
+        for name, value in parameters.items():
+            rospy.set_param(self.namespace + "/filter/" + name, value)
         process = subprocess.Popen(
             [pt.find_program("nodelet", "nodelet"), "standalone", "ist_proximity/VelocityFilter"]
             + ["__ns:=" + self.namespace, "__name:=filter"],
@@ -521,8 +560,8 @@ class VelocityFilterTest(unittest.TestCase):
         )
         pt.wait_until(lambda: process.poll() is not None, "the nodelet to be refused")
         text = process.stdout.read().decode()
-        self.assertIn("~margin", text)
-        self.assertIn("~command_type", text)
+        for expected in texts:
+            self.assertIn(expected, text)
 
 
 if __name__ == "__main__":

@@ -47,6 +47,7 @@ void set_stamp(const ros::Time& now, Message* message) {
   message->header.stamp = now;
 }
 void set_stamp(const ros::Time&, std_msgs::Float64MultiArray*) {}
+void set_stamp(const ros::Time&, geometry_msgs::Twist*) {}
 
 void publish_scale(double scale, const ros::Publisher& publisher) {
   std_msgs::Float64 message;
@@ -81,6 +82,8 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
     subscribe<sensor_msgs::JointState>();
   } else if (config_.command_type == "geometry_msgs/TwistStamped") {
     subscribe<geometry_msgs::TwistStamped>();
+  } else if (config_.command_type == "geometry_msgs/Twist") {
+    subscribe<geometry_msgs::Twist>();
   } else {
     subscribe<trajectory_msgs::JointTrajectory>();
   }
@@ -333,7 +336,7 @@ std::vector<double> CommandFilter::filter(const JointCommand& command, FilterSta
   explain(answer, state);
   if (markers_.getNumSubscribers() > 0) draw(answer, state->header);
   if (command.jacobian.size() == 0 || state->status != FilterState::LIMITED ||
-      (state->limited_joints.empty() && is_twist_proven(command, velocity))) {
+      (!command.keeps_way && state->limited_joints.empty() && is_twist_proven(command, velocity))) {
     return velocity;
   }
   state->status = given_scale_ > 0.0 ? FilterState::SCALED : FilterState::STOPPED;

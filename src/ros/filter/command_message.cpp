@@ -41,7 +41,7 @@ void take(const std::vector<double>& velocity, JointCommand* command) {
 }
 
 JointCommand command_of(const std::vector<std::string>& joints) {
-  return {joints, std::vector<double>(joints.size(), kNaN), "", {}};
+  return {joints, std::vector<double>(joints.size(), kNaN), "", {}, false};
 }
 
 // The positions that velocities lead to within a time [s]; none where one is not known.

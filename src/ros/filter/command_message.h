@@ -1,5 +1,6 @@
 #pragma once
 
+#include <geometry_msgs/Twist.h>
 #include <geometry_msgs/TwistStamped.h>
 #include <sensor_msgs/JointState.h>
 #include <std_msgs/Float64MultiArray.h>
@@ -26,6 +27,7 @@ struct JointCommand {
   /// The tool's linear [m/s] over angular velocity [rad/s] in a twist's frame, by joint. Empty
   /// where the command is no twist.
   Eigen::MatrixXd jacobian;
+  bool keeps_way = false;  ///< it may be slowed down, and not be turned
 };
 
 /// All that commands are read with, besides the message.
@@ -51,6 +53,9 @@ JointCommand read_command(const std_msgs::Float64MultiArray& message, const Comm
 /// fault.
 JointCommand read_command(const geometry_msgs::TwistStamped& message, const CommandReader& reader);
 
+/// That of the tool in its own axes, as a mobile base takes it: it keeps its way.
+JointCommand read_command(const geometry_msgs::Twist& message, const CommandReader& reader);
+
 /// The least velocities [rad/s, m/s] that make a twist.
 /// @param jacobian  JointCommand::jacobian, not empty
 Eigen::VectorXd least_velocity(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& twist);
@@ -66,5 +71,7 @@ void set_velocity(const JointCommand& command, const std::vector<double>& veloci
                   const JointPositionOf& q, std_msgs::Float64MultiArray* message);
 void set_velocity(const JointCommand& command, const std::vector<double>& velocity,
                   const JointPositionOf& q, geometry_msgs::TwistStamped* message);
+void set_velocity(const JointCommand& command, const std::vector<double>& velocity,
+                  const JointPositionOf& q, geometry_msgs::Twist* message);
 
 }  // namespace ist

@@ -11,7 +11,7 @@ FilterConfig read_filter_config(const XmlRpc::XmlRpcValue& tree, std::vector<std
   std::size_t type = 0;
   const std::vector<std::string> types = {"trajectory_msgs/JointTrajectory",
                                           "std_msgs/Float64MultiArray", "sensor_msgs/JointState",
-                                          "geometry_msgs/TwistStamped"};
+                                          "geometry_msgs/TwistStamped", "geometry_msgs/Twist"};
   const Range time = Range::positive("s", 10.0);
   const Range length = Range::non_negative("m", 10.0);
   const Range speed = Range::non_negative("m/s", 100.0);
@@ -42,6 +42,9 @@ FilterConfig read_filter_config(const XmlRpc::XmlRpcValue& tree, std::vector<std
   config.command_type = types[type];
   *warnings = reader.unknown();
   *errors = reader.errors();
+  if (config.command_type == "geometry_msgs/Twist" && config.tool.empty()) {
+    errors->push_back("~tool is empty: it has to name the link that a geometry_msgs/Twist moves");
+  }
   for (std::string& error : config_errors(rows, "~")) errors->push_back(std::move(error));
   return config;
 }

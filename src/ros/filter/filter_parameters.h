@@ -12,13 +12,13 @@ namespace ist {
 /// The parameters of a velocity filter, read at its start (doc/control.md).
 struct FilterConfig {
   RowConfig rows;
-  /// "trajectory_msgs/JointTrajectory", "std_msgs/Float64MultiArray", "sensor_msgs/JointState" or
-  /// "geometry_msgs/TwistStamped".
+  /// "trajectory_msgs/JointTrajectory", "std_msgs/Float64MultiArray", "sensor_msgs/JointState",
+  /// "geometry_msgs/TwistStamped" or "geometry_msgs/Twist".
   std::string command_type = "trajectory_msgs/JointTrajectory";
   /// Joints of a Float64MultiArray, in order, or those that realise a twist; empty: all that have a
   /// position of their own.
   std::vector<std::string> joints;
-  std::string tool;  ///< link that a twist moves; empty: the twist's frame
+  std::string tool;  ///< link that a twist moves; empty: the frame of one with a stamp
   std::string robot_description = "robot_description";
   bool self_proximity = false;       ///< the node's ~self_proximity bounds velocities, too
   double self_stop_distance = 0.01;  ///< [m] nearer than this, no links approach each other

@@ -108,6 +108,16 @@ JointCommand read_command(const geometry_msgs::TwistStamped& message, const Comm
   return command;
 }
 
+JointCommand read_command(const geometry_msgs::Twist& message, const CommandReader& reader) {
+  geometry_msgs::TwistStamped stamped;
+  stamped.header.frame_id = reader.tool;
+  stamped.header.stamp = reader.now;
+  stamped.twist = message;
+  JointCommand command = read_command(stamped, reader);
+  command.keeps_way = true;
+  return command;
+}
+
 void set_velocity(const JointCommand& command, const std::vector<double>& velocity,
                   const JointPositionOf&, geometry_msgs::TwistStamped* message) {
   Twist twist = Twist::Zero();
@@ -118,6 +128,13 @@ void set_velocity(const JointCommand& command, const std::vector<double>& veloci
   }
   assign(twist.head<3>(), &message->twist.linear);
   assign(twist.tail<3>(), &message->twist.angular);
+}
+
+void set_velocity(const JointCommand& command, const std::vector<double>& velocity,
+                  const JointPositionOf& q, geometry_msgs::Twist* message) {
+  geometry_msgs::TwistStamped stamped;
+  set_velocity(command, velocity, q, &stamped);
+  *message = stamped.twist;
 }
 
 }  // namespace ist
