@@ -40,7 +40,6 @@ std::string name(ByteReader* in) {
                                        "max_spheres",
                                        "threads",
                                        "penetration",
-                                       "stiffness",
                                        "enabled",
                                        "sources",
                                        "topic",
@@ -71,7 +70,6 @@ std::string name(ByteReader* in) {
                                        "ignore",
                                        "camera",
                                        "tolerence",
-                                       "ignore_contact_at_rest",
                                        "map",
                                        "scan"};
   const std::size_t known = sizeof kNames / sizeof kNames[0];

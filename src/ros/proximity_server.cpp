@@ -26,8 +26,6 @@ namespace {
 constexpr double kLongestWarmPeriod = 0.005;
 
 constexpr std::chrono::milliseconds kMarkerPeriod(40);  // rviz draws no faster
-// [m] Unknown space is drawn as far from the links as this.
-constexpr double kDrawnUnseen = 0.15;
 
 ros::NodeHandle with_queue(ros::NodeHandle nh, CallbackThread* thread) {
   nh.setCallbackQueue(thread->queue());
@@ -80,21 +78,21 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   if (config_.unknown_space != UnknownSpace::kFree) {
     unknown_space_ = std::make_unique<UnknownSpaceWatch>(
         memories_, config_.query.max_distance,
-        private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1), kDrawnUnseen,
-        buffer_);
+        private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1));
   }
-  trajectory_watch_ = std::make_unique<TrajectoryWatch>(
-      nh_, private_nh_, config_, sources_, buffer_, unknown_space_.get(), ignore_service_, live);
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live,
-                                                  unknown_space_.get(), [this] {
+  trajectory_watch_ =
+      std::make_unique<TrajectoryWatch>(nh_, private_nh_, config_, loader_, sources_, buffer_,
+                                        unknown_space_.get(), ignore_service_, live);
+  query_service_ = std::make_unique<QueryService>(private_nh_, config_, loader_, sources_, buffer_,
+                                                  live, unknown_space_.get(), [this] {
                                                     publish_diagnostics_when_due();
                                                     trajectory_watch_->run_when_due();
                                                   });
   trajectory_watch_->subscribe(query_service_->queue());
   if (config_.self_collision.enabled) {
-    self_proximity_ =
-        std::make_unique<SelfProximity>(private_nh_, config_, buffer_, joint_states_.get(), live);
-    link_pairs_ = std::make_unique<LinkPairService>(private_nh_, config_);
+    self_proximity_ = std::make_unique<SelfProximity>(private_nh_, config_, loader_, buffer_,
+                                                      joint_states_.get(), live);
+    link_pairs_ = std::make_unique<LinkPairService>(private_nh_, config_, loader_);
   }
   cycle_thread_ = std::thread(&Impl::run_cycles, this);
   pose_thread_.start("ist tf", [this] { buffer_.end_disputes(ros::Time::now()); });
@@ -125,8 +123,7 @@ void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Pu
   }
   std::shared_ptr<SourceMemory> memory;
   if (config.memory.enabled) {
-    memory = std::make_shared<SourceMemory>(config, buffer_,
-                                            config_.unknown_space != UnknownSpace::kFree,
+    memory = std::make_shared<SourceMemory>(config, config_.unknown_space != UnknownSpace::kFree,
                                             advertise_map(&private_nh_, "memory/" + config.name));
     memories_.push_back(memory);
   }
@@ -292,7 +289,7 @@ void ProximityServer::Impl::publish_diagnostics() {
   }
   report.zones = zones_.summary(ros::Time::now());
   zone_services_.show();
-  spheres_.show_finer(*loader_.state());
+  spheres_.show(*loader_.state());
   if (joint_states_) {
     report.joint_states = joint_states_->report();
     note(Rank::kRemark, "pose", report.joint_states->problem, &report.findings);

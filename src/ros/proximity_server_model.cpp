@@ -29,8 +29,6 @@ void ProximityServer::Impl::take_model() {
   if (cycle_ && is_refinement(*model_, *model)) return refine_model(std::move(model));
   if (cycle_ && model->robot == model_->robot) {  // a message of its loading
     model_ = std::move(model);
-    query_service_->set_model(model_);
-    trajectory_watch_->set_model(model_);
     return cycle_->set_problem(*model_);
   }
   warm_up_.begin(nullptr);  // of the last model
@@ -51,11 +49,6 @@ void ProximityServer::Impl::take_model() {
                                       : std::vector<std::string>());
     joint_states_->set_kinematics(model_->kinematics);
   }
-  query_service_->set_model(model_);
-  trajectory_watch_->set_model(model_);
-  if (self_proximity_) self_proximity_->set_model(model_);
-  if (link_pairs_) link_pairs_->set_model(model_);
-  spheres_.show(*model_);
   set_source_targets(live_.get().query);
   root_stands_still_ = false;
   next_root_check_ = Clock::time_point();
@@ -117,9 +110,6 @@ void ProximityServer::Impl::notice_ignored_links(const ros::Time& now) {
 void ProximityServer::Impl::refine_model(std::shared_ptr<const ModelState> model) {
   model_ = std::move(model);
   cycle_->refine(model_);
-  query_service_->set_model(model_);
-  trajectory_watch_->set_model(model_);
-  if (self_proximity_) self_proximity_->set_model(model_);
   set_source_targets(live_.get().query);
 }
 

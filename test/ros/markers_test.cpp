@@ -11,8 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "ros/input/unseen_markers.h"
-#include "ros/output/nearest_summary.h"
+#include "ros/input/unknown_space.h"
 #include "support/scene.h"
 
 namespace ist {

@@ -192,7 +192,7 @@ WRONG = [
         [
             "~sources/scan/memory/enabled is set: it is not for a source of type sensor_msgs/LaserScan",
             "each memory needs a file of its own",
-            "need the same resolution and frame_id",
+            "need the same resolution",
             "'two' has self_filter: false",
             "~sources/flat/memory is true: a dictionary is needed",
         ],

@@ -70,7 +70,6 @@ class ReconfigureTest(unittest.TestCase):
                 "gain": 5.0,
                 "smoothing": 0.5,
             },
-            "penetration": {"stiffness": 1e6},
             "speed_scale": {
                 "stop_distance": 0.6,
                 "free_distance": 0.6,

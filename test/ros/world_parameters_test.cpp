@@ -33,7 +33,6 @@ XmlRpcValue good() {
   cell["type"] = "world";
   cell["frame_id"] = "hall";
   cell["margin"] = 0.01;
-  cell["link_margins"]["wrist"] = 0.02;
   XmlRpcValue& table = cell["objects"]["table"];
   table["shape"] = "box";
   table["size"] = list({1.0, 2.0, 0.1});
@@ -58,7 +57,6 @@ TEST(WorldParameters, AreRead) {
   EXPECT_TRUE(std::isinf(source.timeout));
   EXPECT_TRUE(source.is_permanent());
   EXPECT_FALSE(source.world.has_topic);
-  EXPECT_EQ(source.world.link_margins.at("wrist"), 0.02);
   EXPECT_EQ(source.world.robot.description, "/other/robot_description");
   ASSERT_EQ(source.world.objects.size(), 2U);
   const WorldObject& table = source.world.objects[0].object;
@@ -131,10 +129,6 @@ TEST(WorldParameters, MistakesAreNamed) {
                  (*cell)["objects"]["table"]["size"] = list({1.0, std::nan(""), 1.0});
                }),
                table + "size is");
-  EXPECT_PRED2(has, error_of([](auto* cell) {
-                 (*cell)["objects"]["table"]["orientation"] = list({0.0, 0.0, 0.0, 1.0});
-               }),
-               "are both set");
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["table"]["shape"] = "sphere"; }),
                table + "radius is not set");
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["wall"]["mesh"] = ""; }),

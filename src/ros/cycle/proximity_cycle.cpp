@@ -42,7 +42,6 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       self_counts_(config.self_collision.enabled && config.self_collision.in_minimum),
       future_(config.deceleration, model_->kinematics, boxes_, model_->monitored),
       selection_(reader),
-      worlds_(config),
       queries_(std::make_unique<CoherentQueries>(model_->robot, config.query)),
       unknown_space_(watch == nullptr
                          ? nullptr
@@ -166,7 +165,7 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   note_late_frames();
   // The world is known exactly and costs little: it may take half of the time.
   worlds_.set_influence_distance(config.repulsion.influence_distance);
-  worlds_.run(robot_, poses_.X_FL, known_, selection_, query, poses_.stamp.toSec(),
+  worlds_.run(poses_.X_FL, known_, selection_, query, poses_.stamp.toSec(),
               end_of(query.deadline, 0.5 * kQueryShare, begin), &late_worlds_,
               &status_input_.deadline);
   if (query.deadline > 0.0) {
@@ -226,10 +225,10 @@ void ProximityCycle::ask_unknown_space(const LiveConfig& config) {
   if (!unknown_space_) return;
   QueryConfig query = config.query;
   query.deadline *= kUnknownShare;
-  note(Rank::kDegraded, "query",
-       unknown_space_->run(poses_, known_, fixed_frame_, pose_timeout_, query,
-                           config.repulsion.influence_distance),
-       &status_input_.findings);
+  note(
+      Rank::kDegraded, "query",
+      unknown_space_->run(poses_, known_, fixed_frame_, query, config.repulsion.influence_distance),
+      &status_input_.findings);
 }
 
 /// The links that matter most are served first, as time may end.
@@ -341,7 +340,7 @@ Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config, T
     cost.least_known = std::min(cost.least_known, volume.known);
   }
   return penetration_wrench(result, config.query, is_known ? &volume : nullptr, poses_.X_FL[link],
-                            config.penetration);
+                            PenetrationConfig());
 }
 
 /// Tells the background packing what the links need.

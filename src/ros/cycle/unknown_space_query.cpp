@@ -33,21 +33,20 @@ void UnknownSpaceQuery::set_model(std::shared_ptr<const RobotModel> model) {
 }
 
 std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vector<bool>& known,
-                                   const std::string& fixed_frame, double pose_timeout,
-                                   const QueryConfig& config, double influence_distance) {
+                                   const std::string& fixed_frame, const QueryConfig& config,
+                                   double influence_distance) {
   const std::vector<Eigen::Isometry3d>& X_FL = poses.X_FL;
   if (!is_only_reader_) held_ = watch_.share();
   const UnknownSnapshot* unknown = is_only_reader_ ? watch_.newest() : held_.get();
   std::string problem;
-  Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();
-  if (unknown != nullptr) {
-    problem = watch_.place(*unknown, fixed_frame, poses.stamp, pose_timeout, &X_FM);
-  }
+  if (unknown != nullptr) problem = why_unusable(*unknown, fixed_frame, poses.stamp);
   if (unknown == nullptr || !problem.empty()) {
     know_nothing();
     return problem;
   }
-  place(*unknown, X_FM);
+  placed_.boxes = unknown->boxes;
+  placed_.stamp = unknown->stamp;
+  placed_.region = {unknown->center_F, unknown->radius};
   query_.set_config(coarse(config));
   query_.run(X_FL, known, {&placed_}, &results_);
   for (std::size_t i = 0; i < answers_.size(); ++i) {
@@ -78,14 +77,6 @@ void UnknownSpaceQuery::know_nothing() {
   }
 }
 
-void UnknownSpaceQuery::place(const UnknownSnapshot& unknown, const Eigen::Isometry3d& X_FM) {
-  placed_.boxes = unknown.boxes;
-  placed_.stamp = unknown.stamp;
-  placed_.X_FM = X_FM;
-  placed_.region.center_F = X_FM * unknown.center_M;
-  placed_.region.radius = unknown.radius;
-}
-
 /// [m] A lower bound of any signed distance: nothing is deeper inside anything than a link is
 /// thick.
 double UnknownSpaceQuery::deepest(std::size_t link) const {
@@ -100,7 +91,7 @@ void UnknownSpaceQuery::look_about(std::size_t link, const Eigen::Isometry3d& X_
     surroundings.emplace(model_->links[link], watch_.skin(),
                          std::max(influence_distance, 2.0 * watch_.skin()));
   }
-  answers_[link].seen = surroundings->look(unknown.seen, placed_.X_FM.inverse() * X_FL, now);
+  answers_[link].seen = surroundings->look(unknown.seen, X_FL, now);
 }
 
 }  // namespace ist

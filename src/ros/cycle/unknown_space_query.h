@@ -34,11 +34,10 @@ class UnknownSpaceQuery {
 
   /// @param poses          of the links, in `fixed_frame`; ages count from their stamp
   /// @param known          as ProximityQuery::run()
-  /// @param pose_timeout   [s] allowed age of the pose of the memories' frame
   /// @param config         its deadline [s] is for this query
   /// @returns empty, or a sentence on why all space counts as unknown, though some has been seen
   std::string run(const StampedLinkPoses& poses, const std::vector<bool>& known,
-                  const std::string& fixed_frame, double pose_timeout, const QueryConfig& config,
+                  const std::string& fixed_frame, const QueryConfig& config,
                   double influence_distance);
 
   /// The answer for a link of the last run(). While nothing has been seen, it may be inside
@@ -50,7 +49,6 @@ class UnknownSpaceQuery {
  private:
   double deepest(std::size_t link) const;
   void know_nothing();
-  void place(const UnknownSnapshot& unknown, const Eigen::Isometry3d& X_FM);
   void look_about(std::size_t link, const Eigen::Isometry3d& X_FL, double now,
                   double influence_distance, const UnknownSnapshot& unknown);
 
@@ -59,7 +57,7 @@ class UnknownSpaceQuery {
   const bool is_only_reader_;
   ProximityQuery query_;
   std::shared_ptr<const UnknownSnapshot> held_;  ///< by other readers
-  CloudSnapshot placed_;                         ///< the boxes of a snapshot, and where they are
+  CloudSnapshot placed_;                         ///< the boxes of a snapshot
   std::vector<LinkProximity> results_;
   std::vector<UnknownSpaceAnswer> answers_;
   std::vector<std::optional<Surroundings>> surroundings_;  ///< by link, made when first needed

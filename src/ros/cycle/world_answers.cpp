@@ -14,22 +14,6 @@ bool is_near(const LinkProximity& answer) {
 
 }  // namespace
 
-WorldAnswers::WorldAnswers(const ServerConfig& config) : config_(config) {}
-
-/// The largest margin of all sources counts.
-std::vector<double> WorldAnswers::link_margins(const RobotModel& model) const {
-  std::vector<double> margins(model.links.size(), 0.0);
-  for (const SourceConfig& source : config_.sources) {
-    for (std::size_t i = 0; i < margins.size(); ++i) {
-      const auto found = source.world.link_margins.find(model.links[i].name);
-      if (found != source.world.link_margins.end()) {
-        margins[i] = std::max(margins[i], found->second);
-      }
-    }
-  }
-  return margins;
-}
-
 void WorldAnswers::note_motion(const CloudSelection& selection, double time) {
   const Span<const PosedWorld* const> worlds = selection.worlds();
   sources_.assign(selection.world_sources().begin(), selection.world_sources().end());
@@ -53,17 +37,15 @@ void WorldAnswers::note_motion(const CloudSelection& selection, double time) {
   }
 }
 
-void WorldAnswers::run(const RobotModel& robot, Span<const Eigen::Isometry3d> X_FL,
-                       const std::vector<bool>& known, const CloudSelection& selection,
-                       QueryConfig query, double time, TimePoint end, LateFrames* late,
-                       DeadlineCost* cost) {
+void WorldAnswers::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
+                       const CloudSelection& selection, QueryConfig query, double time,
+                       TimePoint end, LateFrames* late, DeadlineCost* cost) {
   is_nearest_.assign(X_FL.size(), false);
   any_ = !selection.worlds().empty();
   time_ = time;
   if (!any_) return;
   if (!query_ || query_->robot() != selection.surfaces()) {
     query_ = std::make_unique<WorldQuery>(selection.surfaces(), query);
-    query_->set_link_margins(link_margins(robot));
   }
   note_motion(selection, time);
   const double max_distance = query.max_distance;

@@ -9,7 +9,6 @@
 #include "ist_proximity/proximity/world_query.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/cycle/late_frames.h"
-#include "ros/parameters/parameters.h"
 #include "ros/status/status.h"
 
 namespace ist {
@@ -17,15 +16,13 @@ namespace ist {
 /// The distances of one cycle to the known worlds, beside those to clouds. One thread.
 class WorldAnswers {
  public:
-  explicit WorldAnswers(const ServerConfig& config);
-
   /// Measures the links against the worlds of a selection.
   /// @param time  [s] of the poses
   /// @param late  frames of the worlds; receives what it took off
   /// @param cost  links that `end` left unfinished are added
-  void run(const RobotModel& robot, Span<const Eigen::Isometry3d> X_FL,
-           const std::vector<bool>& known, const CloudSelection& selection, QueryConfig query,
-           double time, TimePoint end, LateFrames* late, DeadlineCost* cost);
+  void run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
+           const CloudSelection& selection, QueryConfig query, double time, TimePoint end,
+           LateFrames* late, DeadlineCost* cost);
 
   /// Takes the nearer of cloud and world for each link; the lower bound is that of both. A link
   /// that is UNKNOWN to either is UNKNOWN.
@@ -38,8 +35,6 @@ class WorldAnswers {
   std::shared_ptr<const RobotSurfaces> surfaces() const {
     return query_ ? query_->robot() : nullptr;
   }
-  /// [m] By link: see WorldQuery::set_link_margins().
-  std::vector<double> link_margins(const RobotModel& model) const;
 
   /// Whether the nearest point of a link is an object's.
   bool is_nearest(std::size_t link) const { return is_nearest_[link]; }
@@ -72,7 +67,6 @@ class WorldAnswers {
   };
   void note_motion(const CloudSelection& selection, double time);
 
-  const ServerConfig config_;
   std::unique_ptr<WorldQuery> query_;  ///< null before the first world
   std::vector<LinkProximity> answers_;
   std::vector<bool> is_nearest_;

@@ -24,6 +24,12 @@ using ist_proximity::FilterState;
 constexpr double kNegligible = 1e-8;
 // [s] Over which the speed of joints that are not commanded is measured.
 constexpr double kSpeedWindow = 0.05;
+// [rad/s, m/s] Joints whose velocity the URDF does not limit: no arm is faster.
+constexpr double kMaxSpeed = 10.0;
+// [s] The solver ends by then, and the command is scaled: a hundred times what it takes as a rule.
+constexpr double kTimeLimit = 0.0005;
+// Zeros where commands or data are late come this often, as commands do.
+const ros::WallDuration kZeroPeriod(0.01);
 // Time in which the last velocity leaves: roscpp sends by another thread, and drops what a
 // publisher has not sent when it goes.
 const ros::WallDuration kLeave(0.1);
@@ -59,9 +65,7 @@ void publish_scale(double scale, const ros::Publisher& publisher) {
 
 CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : nh_(nh), private_nh_(private_nh), config_(read_config(private_nh)), listener_(tf_, nh_) {
-  if (!nh_.searchParam(config_.robot_description, description_)) {
-    description_ = config_.robot_description;
-  }
+  if (!nh_.searchParam("robot_description", description_)) description_ = "robot_description";
   state_ = private_nh_.advertise<FilterState>("filter_state", 10);
   scale_ = private_nh_.advertise<std_msgs::Float64>("speed_scale", 10);
   markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("filter_markers", 1);
@@ -87,8 +91,7 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
   } else {
     subscribe<trajectory_msgs::JointTrajectory>();
   }
-  timer_ = nh_.createWallTimer(ros::WallDuration(1.0 / config_.rate),
-                               [this](const ros::WallTimerEvent&) { on_timer(); });
+  timer_ = nh_.createWallTimer(kZeroPeriod, [this](const ros::WallTimerEvent&) { on_timer(); });
 }
 
 CommandFilter::~CommandFilter() {
@@ -165,7 +168,7 @@ void CommandFilter::read_robot() {
   robot_fault_.clear();
   history_.emplace(kinematics_);
   proximity_.emplace(kinematics_);
-  filter_.emplace(joint_limits(*kinematics_, config_.max_speed), std::vector<double>(),
+  filter_.emplace(joint_limits(*kinematics_, kMaxSpeed), std::vector<double>(),
                   config_.rows.horizon);
   const std::size_t columns = proximity_->joints().size();
   command_column_.assign(columns, 0.0);
@@ -355,7 +358,7 @@ bool CommandFilter::is_twist_proven(const JointCommand& command,
   for (std::size_t i = 0; i < velocity.size(); ++i) {
     command_column_[*column_of(command.joints[i])] = least[static_cast<Eigen::Index>(i)];
   }
-  const FilterAnswer& answer = filter_->run(command_column_, q_column_, rows_, config_.time_limit);
+  const FilterAnswer& answer = filter_->run(command_column_, q_column_, rows_, kTimeLimit);
   for (std::size_t c = 0; c < command_column_.size(); ++c) {
     if (!(std::abs(answer.velocity[c] - command_column_[c]) <= kNegligible)) return false;
   }
@@ -383,7 +386,7 @@ const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::T
   for (std::size_t c = 0; c < q_column_.size(); ++c) q_column_[c] = q_now_[proximity_->joints()[c]];
   hold_others(is_commanded);
   take_off_given(now, config_.rows.horizon);
-  return filter_->run(command_column_, q_column_, rows_, config_.time_limit);
+  return filter_->run(command_column_, q_column_, rows_, kTimeLimit);
 }
 
 /// Joints that are not commanded go on as they move now: what they do comes off the limits, and

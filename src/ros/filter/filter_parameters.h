@@ -19,15 +19,11 @@ struct FilterConfig {
   /// position of their own.
   std::vector<std::string> joints;
   std::string tool;  ///< link that a twist moves; empty: the frame of one with a stamp
-  std::string robot_description = "robot_description";
   bool self_proximity = false;       ///< the node's ~self_proximity bounds velocities, too
   double self_stop_distance = 0.01;  ///< [m] nearer than this, no links approach each other
   double command_timeout = 0.1;      ///< [s]
   double proximity_timeout = 0.2;    ///< [s] oldest answer that still counts
   double joint_timeout = 0.1;        ///< [s] oldest joint state that still counts
-  double rate = 100.0;               ///< [Hz] of zeros where commands or data are late
-  double max_speed = 10.0;           ///< [rad/s, m/s] of every joint
-  double time_limit = 0.0005;        ///< [s] of the solver
 };
 
 /// Reads what is below the private namespace.

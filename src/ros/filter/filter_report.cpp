@@ -8,7 +8,7 @@
 #include "ros/common/publish.h"
 #include "ros/common/text.h"
 #include "ros/filter/command_filter.h"
-#include "ros/output/nearest_summary.h"
+#include "ros/output/markers.h"
 
 namespace ist {
 namespace {

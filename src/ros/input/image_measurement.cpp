@@ -84,7 +84,7 @@ Measurement DepthCamera::read(const sensor_msgs::ImageConstPtr& message) const {
   image.data_size = message->data.size();
   image.unit = config_.depth_unit;
   RawCloud raw;
-  fault = check_depth_image(image, rays_, &raw, config_.ingest.max_points);
+  fault = check_depth_image(image, rays_, &raw);
   if (!fault.empty()) return faulty(header, "malformed image: " + fault);
   raw.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
   Measurement measurement = measure_points(header, raw, message->data.size(), noise_);

@@ -145,7 +145,7 @@ Measurement measure_points(const std_msgs::Header& header, const RawCloud& point
   return measurement;
 }
 
-Measurement read_cloud(const sensor_msgs::PointCloud2ConstPtr& message, std::size_t max_points,
+Measurement read_cloud(const sensor_msgs::PointCloud2ConstPtr& message,
                        const std::shared_ptr<NoiseFilter>& noise) {
   CloudLayout layout;
   for (const sensor_msgs::PointField& field : message->fields) {
@@ -159,7 +159,7 @@ Measurement read_cloud(const sensor_msgs::PointCloud2ConstPtr& message, std::siz
   layout.data = message->data.data();
   layout.data_size = message->data.size();
   RawCloud raw;
-  const std::string fault = check_layout(layout, &raw, max_points);
+  const std::string fault = check_layout(layout, &raw);
   if (!fault.empty()) return faulty(message->header, "malformed cloud: " + fault);
   raw.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
   return measure_points(message->header, raw, message->data.size(), noise);
@@ -220,10 +220,7 @@ std::vector<ros::Subscriber> subscribe(const SourceConfig& config, ros::NodeHand
       config.noise.radius > 0.0 ? std::make_shared<NoiseFilter>(config.noise) : nullptr;
   if (config.type == SourceType::kCloud) {
     return {subscribe_as<sensor_msgs::PointCloud2>(
-        config, nh, receive,
-        [max_points = config.ingest.max_points, noise](const auto& message) {
-          return read_cloud(message, max_points, noise);
-        },
+        config, nh, receive, [noise](const auto& message) { return read_cloud(message, noise); },
         from_pool<sensor_msgs::PointCloud2>())};
   }
   // By ROS' convention the CameraInfo is beside the images.

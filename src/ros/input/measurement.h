@@ -71,8 +71,7 @@ Measurement faulty(const std_msgs::Header& header, const std::string& fault);
 Measurement measure_points(const std_msgs::Header& header, const RawCloud& points,
                            std::size_t bytes, const std::shared_ptr<NoiseFilter>& noise);
 
-/// @param max_points  a cloud of more points is faulty
-Measurement read_cloud(const sensor_msgs::PointCloud2ConstPtr& message, std::size_t max_points,
+Measurement read_cloud(const sensor_msgs::PointCloud2ConstPtr& message,
                        const std::shared_ptr<NoiseFilter>& noise);
 
 /// Reads depth images with the newest calibration of their camera. Not thread safe.

@@ -19,7 +19,6 @@
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/input/snapshot_exchange.h"
 #include "ros/input/source_report.h"
-#include "ros/input/topic_advice.h"
 #include "ros/parameters/source_config.h"
 #include "ros/poses/transform_buffer.h"
 #include "ros/poses/transforms.h"
@@ -73,6 +72,24 @@ struct SourceTarget {
   bool is_same_robot(const SourceTarget& other) const {
     return model == other.model || (model && other.model && same_geometry(*model, *other.model));
   }
+};
+
+/// A sentence for somebody whose topic stays silent: that it has another type, or else which topics
+/// a source could have. The master is asked now and then; it may take long to answer, so no lock
+/// should be held around ask(). Not thread safe.
+class TopicAdvice {
+ public:
+  /// @param topic  resolved
+  /// @param type   message type that the source expects
+  /// @param own    topic of the node itself, which is left out
+  TopicAdvice(std::string topic, std::string type, std::string own);
+
+  /// Returns the sentence when it is due and the master answers, else nothing.
+  std::optional<std::string> ask();
+
+ private:
+  const std::string topic_, type_, own_;
+  std::chrono::steady_clock::time_point next_;
 };
 
 /// The common part of sensors, maps and known worlds: a topic whose messages are turned into

@@ -11,9 +11,7 @@
 #include "internal/cloud/memory_body.h"
 #include "internal/cloud/memory_scan.h"
 #include "internal/robot/anytime_model.h"
-#include "ros/common/frame_name.h"
 #include "ros/common/stopwatch.h"
-#include "ros/poses/transforms.h"
 
 namespace ist {
 namespace {
@@ -46,10 +44,9 @@ bool is_there(const std::string& path) {
 
 }  // namespace
 
-SourceMemory::SourceMemory(const SourceConfig& config, const TransformBuffer& buffer,
-                           bool wants_body, const ros::Publisher& publisher)
+SourceMemory::SourceMemory(const SourceConfig& config, bool wants_body,
+                           const ros::Publisher& publisher)
     : config_(config),
-      buffer_(buffer),
       wants_body_(wants_body),
       publisher_(publisher),
       map_(map_config(config)),
@@ -72,7 +69,6 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
   } else if (!std::isnan(map_.now())) {
     // Space that the last remembered cloud answered for may be out of this one's view.
     map_.forget(cloud.cloud.stamp);
-    find_frame(cloud.stamp);
     hidden = make_snapshot(&MemoryMap::occupied_boxes);
   }
   if (map_.lost() > lost_) {
@@ -94,7 +90,7 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
 void SourceMemory::begin_target(const SourceTarget& target) {
   if (target.generation == generation_ && target.fixed_frame == fixed_frame_) return;
   const std::lock_guard<std::mutex> lock(mutex_);
-  const std::string frame_before = frame();
+  const std::string frame_before = fixed_frame_;
   const bool is_first = generation_ == 0;
   const double step = target.set_back - set_back_;
   generation_ = target.generation;
@@ -104,15 +100,15 @@ void SourceMemory::begin_target(const SourceTarget& target) {
     read_file();
   } else {
     set_back(step);
-    if (frame() != frame_before) change_frame(frame_before);
+    if (fixed_frame_ != frame_before) change_frame(frame_before);
   }
   hand_over();
 }
 
 void SourceMemory::change_frame(const std::string& before) {
   if (map_.has_obstacles()) {
-    note_loss("its memory is lost: it was in the frame '" + before + "', and is in '" + frame() +
-              "' now");
+    note_loss("its memory is lost: it was in the frame '" + before + "', and is in '" +
+              fixed_frame_ + "' now");
   }
   map_.clear();
   body_.clear();
@@ -156,7 +152,6 @@ void SourceMemory::grow_older() {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (std::isnan(map_.now())) return;
   map_.forget(ros::Time::now().toSec());
-  find_frame(ros::Time::now());
   hand_over();
 }
 
@@ -168,25 +163,7 @@ void SourceMemory::note_loss(const std::string& text) {
 
 std::string SourceMemory::loss() const {
   const std::lock_guard<std::mutex> lock(told_mutex_);
-  const bool is_lost = !told_.loss.empty() && ros::Time::now().toSec() < told_.lost_until;
-  return told_.unplaced.empty() && is_lost ? told_.loss : told_.unplaced;
-}
-
-/// Finds where the memory's frame is, or was at most the source's timeout ago.
-void SourceMemory::find_frame(const ros::Time& time) {
-  told_next_.unplaced.clear();
-  const std::string own = frame();
-  if (own == fixed_frame_) return;
-  Eigen::Isometry3d X_MF;
-  std::string fault = look_up(buffer_, own, fixed_frame_, time, &X_MF);
-  if (!fault.empty()) {
-    fault = look_up_newest(buffer_, own, fixed_frame_, time, config_.timeout, &X_MF);
-  }
-  if (fault.empty()) {
-    X_MF_ = X_MF;
-  } else if (map_.has_obstacles()) {
-    told_next_.unplaced = "nobody knows where what it remembers is (memory/frame_id): " + fault;
-  }
+  return ros::Time::now().toSec() < told_.lost_until ? told_.loss : "";
 }
 
 /// Hands what is told, and newest(), to those who must not wait for a cloud.
@@ -230,52 +207,35 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
     return "the last " + std::string(noun(config_.type)) +
            " is not remembered: too little of it was measured";
   }
-  const std::string frame = without_slash(config_.memory.frame_id);
-  Eigen::Isometry3d X_MF = Eigen::Isometry3d::Identity();
-  if (!frame.empty() && frame != target.fixed_frame) {
-    const std::string fault =
-        look_up(buffer_, frame, target.fixed_frame, measurement.header.stamp, &X_MF);
-    if (!fault.empty()) {
-      return "the last " + std::string(noun(config_.type)) +
-             " is not remembered (memory/frame_id): " + fault;
-    }
-  }
-  X_MF_ = X_MF;
-  RegionOfInterest region_M = target.region;
-  region_M.center_F = X_MF_ * target.region.center_F;
-  map_.set_region(region_M);
-  read_memory_scan(measurement.points, cloud.cloud, X_MF_ * cloud.cloud.X_FS,
-                   config_.ingest.min_range, map_.config().max_range, &scan_, cloud.in_zones);
+  map_.set_region(target.region);
+  read_memory_scan(measurement.points, cloud.cloud, cloud.cloud.X_FS, config_.ingest.min_range,
+                   map_.config().max_range, &scan_, cloud.in_zones);
   map_.insert(scan_);
-  told_next_.unplaced.clear();
   stamp_ = cloud.cloud.stamp;
-  note_body(placement, X_MF_, cloud.cloud.stamp);
+  note_body(placement, cloud.cloud.stamp);
   return "";
 }
 
 /// The robot's own space is known: nothing else is there.
-void SourceMemory::note_body(const Placement& placement, const Eigen::Isometry3d& X_MF,
-                             double stamp) {
+void SourceMemory::note_body(const Placement& placement, double stamp) {
   if (!wants_body_ || stamp - body_noted_ < kBodyPeriod) return;
   body_noted_ = stamp;
   links_.clear();
   for (const PosedSolid& link : placement.robot) {
-    links_.push_back(ist::note_body({&link, 1}, X_MF, skin(), stamp, &body_));
+    links_.push_back(
+        ist::note_body({&link, 1}, Eigen::Isometry3d::Identity(), skin(), stamp, &body_));
   }
 }
 
 /// @param find_boxes  of MemoryMap: the boxes that queries get
-/// @returns null where nobody knows where they are
 std::shared_ptr<const SourceSnapshot> SourceMemory::make_snapshot(
     void (MemoryMap::*find_boxes)(VoxelBoxes*) const) const {
-  if (!told_next_.unplaced.empty()) return nullptr;
   VoxelBoxes boxes;
   (map_.*find_boxes)(&boxes);
   auto index = std::make_shared<BoxIndex>();
   index->build(boxes);
   auto snapshot = std::make_shared<SourceSnapshot>();
   snapshot->cloud.boxes = index;
-  snapshot->cloud.X_FM = X_MF_.inverse();
   snapshot->cloud.box_extent = extent_;
   snapshot->cloud.counts.received = static_cast<std::uint32_t>(told_next_.counts.known);
   snapshot->cloud.counts.used = static_cast<std::uint32_t>(boxes.size());
@@ -293,13 +253,8 @@ void SourceMemory::publish_when_due(const ros::Time& stamp) {
   next_publication_ = now + kPublicationPeriod;
   std_msgs::Header header;
   header.stamp = stamp;
-  header.frame_id = frame();
+  header.frame_id = fixed_frame_;
   publish_map(publisher_, header, map_.config().resolution, map_.octree_bytes());
-}
-
-/// tf's name of the memory's frame. Under the mutex, or in the source's thread.
-std::string SourceMemory::frame() const {
-  return config_.memory.frame_id.empty() ? fixed_frame_ : without_slash(config_.memory.frame_id);
 }
 
 std::string SourceMemory::shortage() const {
@@ -359,7 +314,7 @@ bool SourceMemory::add_to(SeenSpace* seen, KnownSpace* known) {
   seen->add(body_);
   known->links = links_;
   known->stamp = stamp_;
-  known->frame = frame();  // the thread of the source writes it under the same mutex
+  known->frame = fixed_frame_;  // the thread of the source writes it under the same mutex
   return true;
 }
 

@@ -12,30 +12,27 @@
 #include "ros/input/measurement.h"
 #include "ros/input/source.h"
 #include "ros/parameters/source_config.h"
-#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
 /// What a memory knows beside its voxels.
 struct KnownSpace {
-  VoxelBoxes links;    ///< [m] each holds a link as it was last noted, in the memory's frame M
+  VoxelBoxes links;    ///< [m] each holds a link as it was last noted, in the fixed frame
   double stamp = 0.0;  ///< [s] of the last cloud
-  std::string frame;   ///< tf's name of M
+  std::string frame;   ///< the fixed frame's name
 };
 
-/// What one source remembers (~memory): its clouds go into a MemoryMap in the source's thread,
-/// before they are handed to queries, so that a cloud and what is hidden from it always belong
-/// together.
+/// What one source remembers (~memory) in the fixed frame: its clouds go into a MemoryMap in the
+/// source's thread, before they are handed to queries, so that a cloud and what is hidden from it
+/// always belong together.
 ///
 /// For queries it is a source of its own, NAME/memory. Beside a fresh cloud its snapshots come with
 /// those of its parent (see CloudSelection), else they are its own.
 class SourceMemory : public ObstacleSource {
  public:
   /// @param config     its memory is enabled
-  /// @param buffer     outlives this
   /// @param wants_body  whether the space that the robot takes up has to be known (~unknown_space)
-  SourceMemory(const SourceConfig& config, const TransformBuffer& buffer, bool wants_body,
-               const ros::Publisher& publisher);
+  SourceMemory(const SourceConfig& config, bool wants_body, const ros::Publisher& publisher);
 
   /// Sets the source whose memory this is, before either is used; it outlives this.
   void set_parent(const ObstacleSource* parent) { parent_ = parent; }
@@ -83,7 +80,6 @@ class SourceMemory : public ObstacleSource {
  private:
   struct Told {
     std::string problem, doubt;
-    std::string unplaced;     ///< why nobody knows where its obstacles are; empty: they are known
     std::string loss;         ///< empty: nothing has been lost
     double lost_until = 0.0;  ///< [s] when what was lost would have been forgotten
     MemoryCounts counts;
@@ -93,21 +89,18 @@ class SourceMemory : public ObstacleSource {
   std::string insert(const Measurement& measurement, const Placement& placement,
                      const SourceTarget& target, const SourceSnapshot& cloud);
   void change_frame(const std::string& before);
-  void find_frame(const ros::Time& time);
   void set_back(double step);
   void read_file();
   void note_loss(const std::string& text);
   void hand_over();
-  void note_body(const Placement& placement, const Eigen::Isometry3d& X_MF, double stamp);
+  void note_body(const Placement& placement, double stamp);
   std::shared_ptr<const SourceSnapshot> make_snapshot(void (MemoryMap::*find_boxes)(VoxelBoxes*)
                                                           const) const;
   void publish_when_due(const ros::Time& stamp);
   std::string shortage() const;
   std::string advice() const;
-  std::string frame() const;
 
   const SourceConfig config_;
-  const TransformBuffer& buffer_;
   const bool wants_body_;
   ros::Publisher publisher_;
   const ObstacleSource* parent_ = nullptr;
@@ -126,8 +119,7 @@ class SourceMemory : public ObstacleSource {
 
   mutable std::mutex mutex_;  ///< guards the members below
   MemoryMap map_, body_;
-  Eigen::Isometry3d X_MF_ = Eigen::Isometry3d::Identity();
-  VoxelBoxes links_;    ///< [m] each holds a link, in M
+  VoxelBoxes links_;    ///< [m] each holds a link
   double stamp_ = 0.0;  ///< [s] of the last cloud
   std::string file_problem_;
   bool is_file_read_ = false;  ///< or there was none

@@ -3,15 +3,18 @@
 #include <ros/console.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
 
+#include "ros/common/eigen_conversion.h"
 #include "ros/common/exceptions.h"
 #include "ros/common/publish.h"
 #include "ros/common/stopwatch.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
-#include "ros/input/unseen_markers.h"
-#include "ros/poses/transforms.h"
 
 namespace ist {
 namespace {
@@ -25,19 +28,80 @@ constexpr double kWorkingShare = 0.25;
 constexpr std::size_t kMaxBoxes = 1000000;
 constexpr double kSmaller = 0.8;
 constexpr std::chrono::milliseconds kMarkerPeriod(500);
+// [m] Unknown space is drawn as far from the links as this.
+constexpr double kDrawnUnseen = 0.15;
 // [s] Stamps are not so far ahead of the clock, unless it has gone back (see SourceMemory).
 constexpr double kBeganAnew = 1.0;
+
+using visualization_msgs::Marker;
+
+constexpr std::size_t kMaxCubes = 20000;
+constexpr double kLargestCube = 0.05;  // [m] Larger boxes are drawn in parts.
+constexpr double kDrawnShare = 0.25;   // of a cube's edges, so that the robot is seen through them
+constexpr double kSizeStep = 1e-4;     // [m] Cubes whose sizes differ by less are one list.
+constexpr double kGrey = 0.6;
+constexpr double kOpacity = 0.8;  // of what touches a link; nothing is left at the range's end
+
+std_msgs::ColorRGBA grey(double opacity) {
+  std_msgs::ColorRGBA color;
+  color.r = color.g = color.b = static_cast<float>(kGrey);
+  color.a = static_cast<float>(opacity);
+  return color;
+}
+
+struct Cube {
+  Eigen::AlignedBox3d box;
+  double distance;  ///< [m] to the nearest link's box
+};
+
+double distance_to(const VoxelBoxes& links, const Eigen::AlignedBox3d& box) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const Eigen::AlignedBox3d& link : links) {
+    smallest = std::min(smallest, link.exteriorDistance(box));
+  }
+  return smallest;
+}
+
+/// Halves a box along its longest side until its parts are small or far.
+void append_parts(const Eigen::AlignedBox3d& box, const VoxelBoxes& links, double range,
+                  std::vector<Cube>* cubes) {
+  const double distance = distance_to(links, box);
+  if (!(distance < range)) return;
+  int side = 0;
+  if (box.sizes().maxCoeff(&side) <= kLargestCube) {
+    cubes->push_back({box, distance});
+    return;
+  }
+  Eigen::AlignedBox3d low = box, high = box;
+  low.max()[side] = high.min()[side] = box.center()[side];
+  append_parts(low, links, range, cubes);
+  append_parts(high, links, range, cubes);
+}
+
+void keep_nearest(std::vector<Cube>* cubes) {
+  if (cubes->size() <= kMaxCubes) return;
+  std::nth_element(cubes->begin(), cubes->begin() + kMaxCubes, cubes->end(),
+                   [](const Cube& a, const Cube& b) { return a.distance < b.distance; });
+  cubes->resize(kMaxCubes);
+}
+
+Marker cube_list(const Eigen::Vector3d& size, const std_msgs::Header& header, int id) {
+  Marker marker;
+  marker.header = header;
+  marker.ns = "unseen";
+  marker.id = id;
+  marker.type = Marker::CUBE_LIST;
+  marker.pose.orientation.w = 1.0;
+  assign(kDrawnShare * size, &marker.scale);
+  marker.color = grey(kOpacity);
+  return marker;
+}
 
 }  // namespace
 
 UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, double range,
-                                     const ros::Publisher& publisher, double drawn_range,
-                                     const TransformBuffer& buffer)
-    : memories_(std::move(memories)),
-      range_(range),
-      publisher_(publisher),
-      drawn_range_(drawn_range),
-      buffer_(buffer) {
+                                     const ros::Publisher& publisher)
+    : memories_(std::move(memories)), range_(range), publisher_(publisher) {
   for (const auto& memory : memories_) skin_ = std::max(skin_, memory->skin());
   thread_ = std::thread(&UnknownSpaceWatch::run, this);
 }
@@ -57,17 +121,42 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::share() const {
   return shared_;
 }
 
-std::string UnknownSpaceWatch::place(const UnknownSnapshot& unknown, const std::string& fixed_frame,
-                                     const ros::Time& time, double max_age,
-                                     Eigen::Isometry3d* X_FM) const {
-  const double ahead = unknown.stamp - time.toSec();
-  if (ahead > kBeganAnew) {
-    return "all space counts as unknown: " +
-           format_text("what was seen last is of %.2f s after the present", ahead);
+visualization_msgs::MarkerArray unseen_markers(const VoxelBoxes& boxes, const VoxelBoxes& links,
+                                               double range, const std_msgs::Header& header) {
+  visualization_msgs::MarkerArray array;
+  array.markers.emplace_back();
+  array.markers.back().header = header;
+  array.markers.back().action = Marker::DELETEALL;
+  array.markers.back().pose.orientation.w = 1.0;
+  std::vector<Cube> cubes;
+  for (const Eigen::AlignedBox3d& box : boxes) append_parts(box, links, range, &cubes);
+  keep_nearest(&cubes);
+
+  std::map<std::array<long, 3>, std::size_t> lists;  // by size, all cubes of which are one marker
+  for (const Cube& cube : cubes) {
+    const Eigen::Vector3d size = cube.box.sizes();
+    std::array<long, 3> key{};
+    for (int k = 0; k < 3; ++k) key[static_cast<std::size_t>(k)] = std::lround(size[k] / kSizeStep);
+    const auto [list, is_new] = lists.try_emplace(key, array.markers.size());
+    if (is_new) array.markers.push_back(cube_list(size, header, static_cast<int>(lists.size())));
+    Marker& marker = array.markers[list->second];
+    marker.points.emplace_back();
+    assign(cube.box.center(), &marker.points.back());
+    const double opacity = kOpacity * (1.0 - cube.distance / range);
+    marker.colors.push_back(grey(opacity));
   }
-  const std::string problem =
-      look_up_near(buffer_, fixed_frame, unknown.frame, time, max_age, X_FM, nullptr);
-  return problem.empty() ? "" : "all space counts as unknown (memory/frame_id): " + problem;
+  return array;
+}
+
+std::string why_unusable(const UnknownSnapshot& unknown, const std::string& fixed_frame,
+                         const ros::Time& time) {
+  if (unknown.frame != fixed_frame) {
+    return "all space counts as unknown: the fixed frame is another one since it was seen";
+  }
+  const double ahead = unknown.stamp - time.toSec();
+  if (ahead <= kBeganAnew) return "";
+  return "all space counts as unknown: " +
+         format_text("what was seen last is of %.2f s after the present", ahead);
 }
 
 void UnknownSpaceWatch::run() {
@@ -115,7 +204,7 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
   index->build(boxes);
   snapshot->frame = all.frame;
   snapshot->boxes = index;
-  snapshot->center_M = robot.center();
+  snapshot->center_F = robot.center();
   snapshot->radius = radius;
   publish_when_due(boxes, all);
   return snapshot;
@@ -127,7 +216,7 @@ void UnknownSpaceWatch::publish_when_due(const VoxelBoxes& boxes, const KnownSpa
   next_publication_ = now + kMarkerPeriod;
   std_msgs::Header header;  // its stamp is 0, so rviz takes the newest transform
   header.frame_id = known.frame;
-  publish_message(publisher_, unseen_markers(boxes, known.links, drawn_range_, header));
+  publish_message(publisher_, unseen_markers(boxes, known.links, kDrawnUnseen, header));
 }
 
 }  // namespace ist

@@ -2,6 +2,8 @@
 
 #include <ros/publisher.h>
 #include <ros/time.h>
+#include <std_msgs/Header.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <Eigen/Geometry>
 #include <chrono>
@@ -15,31 +17,32 @@
 #include "ist_proximity/cloud/seen_space.h"
 #include "ros/common/stop_signal.h"
 #include "ros/input/source_memory.h"
-#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
 /// The space about the robot that no memory knows, at one instant. Immutable.
 struct UnknownSnapshot {
-  std::string frame;                                   ///< tf's name of the memories' frame M
-  std::shared_ptr<const BoxIndex> boxes;               ///< of unknown space, in M
-  Eigen::Vector3d center_M = Eigen::Vector3d::Zero();  ///< [m] they fill a sphere about the robot
+  std::string frame;                                   ///< the fixed frame's name
+  std::shared_ptr<const BoxIndex> boxes;               ///< of unknown space
+  Eigen::Vector3d center_F = Eigen::Vector3d::Zero();  ///< [m] they fill a sphere about the robot
   double radius = 0.0;                                 ///< [m] of that sphere
   double stamp = 0.0;                                  ///< [s] of the newest cloud in it
   SeenSpace seen;
 };
 
+/// Says why all space counts as unknown at an instant, though some has been seen; empty: it does
+/// not.
+std::string why_unusable(const UnknownSnapshot& unknown, const std::string& fixed_frame,
+                         const ros::Time& time);
+
 /// Joins what the memories of all sources know, a few times a second in a thread of its own, and
 /// makes boxes of the rest (~unknown_space). What becomes known in between counts as unknown still.
 class UnknownSpaceWatch {
  public:
-  /// @param memories  with the same resolution and frame
+  /// @param memories  with the same resolution
   /// @param range     [m] farther from the robot nothing is asked
-  /// @param publisher  of a MarkerArray that shows the boxes, while somebody listens
-  /// @param drawn_range  [m] farther from the robot no boxes are drawn
-  /// @param buffer  outlives this
-  UnknownSpaceWatch(SourceMemories memories, double range, const ros::Publisher& publisher,
-                    double drawn_range, const TransformBuffer& buffer);
+  /// @param publisher  of a MarkerArray that shows the boxes near the links, while somebody listens
+  UnknownSpaceWatch(SourceMemories memories, double range, const ros::Publisher& publisher);
   ~UnknownSpaceWatch();
 
   /// The newest snapshot; null: nothing has been seen yet. It stays valid until the next call and
@@ -47,13 +50,6 @@ class UnknownSpaceWatch {
   const UnknownSnapshot* newest();
   /// The same for any other thread; valid as long as it is held.
   std::shared_ptr<const UnknownSnapshot> share() const;
-
-  /// Looks up where the memories' frame is at an instant, or else at the newest one. Thread safe.
-  /// @param max_age  [s] allowed age of that instant
-  /// @param X_FM     set on success
-  /// @returns empty on success, else a sentence
-  std::string place(const UnknownSnapshot& unknown, const std::string& fixed_frame,
-                    const ros::Time& time, double max_age, Eigen::Isometry3d* X_FM) const;
 
   /// [m] Space nearer to a link than this may be the robot's own, and counts as known.
   double skin() const { return skin_; }
@@ -66,8 +62,6 @@ class UnknownSpaceWatch {
   const SourceMemories memories_;
   const double range_;
   const ros::Publisher publisher_;
-  const double drawn_range_;
-  const TransformBuffer& buffer_;
   std::chrono::steady_clock::time_point next_publication_;  ///< used by the thread alone
   double skin_ = 0.0;
   SnapshotChannel<std::shared_ptr<const UnknownSnapshot>> channel_;
@@ -76,5 +70,15 @@ class UnknownSpaceWatch {
   StopSignal stop_;
   std::thread thread_;
 };
+
+/// Draws the unknown space near a robot as small grey cubes, the fainter the farther they are,
+/// after what was drawn before is deleted. Where there are more cubes than rviz can turn smoothly,
+/// the nearest are drawn.
+/// @param boxes  [m] of unknown space
+/// @param links  [m] each holds a link, in the same frame
+/// @param range  [m] what is farther than this from each of `links` is not drawn
+/// @param header  its frame is that of boxes and links
+visualization_msgs::MarkerArray unseen_markers(const VoxelBoxes& boxes, const VoxelBoxes& links,
+                                               double range, const std_msgs::Header& header);
 
 }  // namespace ist

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <iterator>
 #include <utility>
-#include <variant>
 
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
@@ -15,19 +14,10 @@
 namespace ist {
 namespace {
 
-std::vector<double> numbers(const Shape& shape) {
-  if (const auto* box = std::get_if<Box>(&shape)) {
-    return {box->size.x(), box->size.y(), box->size.z()};
-  }
-  if (const auto* sphere = std::get_if<Sphere>(&shape)) return {sphere->radius};
-  const auto& cylinder = std::get<Cylinder>(shape);
-  return {cylinder.radius, cylinder.length};
-}
-
 // Whether two zones of one name differ in nothing but their lifetime.
 bool is_same(const ZoneConfig& a, const ZoneConfig& b) {
   return a.frame == b.frame && a.links == b.links && a.shape.index() == b.shape.index() &&
-         numbers(a.shape) == numbers(b.shape) && a.X_BZ.matrix() == b.X_BZ.matrix();
+         zone_sizes(a.shape) == zone_sizes(b.shape) && a.X_BZ.matrix() == b.X_BZ.matrix();
 }
 
 bool is_before(const std::shared_ptr<LiveZone>& a, const std::shared_ptr<LiveZone>& b) {

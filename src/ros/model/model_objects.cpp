@@ -11,6 +11,8 @@
 namespace ist {
 namespace {
 
+constexpr std::size_t kMostAttached = 100;
+
 std::string not_ready(const ModelState& state) {
   return "the robot's model is not ready yet: " + state.problem;
 }
@@ -42,7 +44,7 @@ std::string ModelLoader::why_cancelled() const {
   if (stop_ || changes_ended_) return "the node is shutting down";
   if (change_revoked_) return "the object was detached while it was being attached";
   if (reload_) return "the robot's model has been loaded again meanwhile; try again";
-  return format_text("it takes longer than %g s (~attach/max_time)", config_.attach.max_time) +
+  return format_text("it takes longer than %g s (~attach/max_time)", config_.attach_max_time) +
          "; use a simpler mesh, a primitive shape, or raise ~packing/max_error";
 }
 
@@ -54,7 +56,7 @@ void ModelLoader::begin_change(const std::string& name) {
 }
 
 void ModelLoader::begin_deadline() {
-  const std::chrono::duration<double> allowed(config_.attach.max_time);
+  const std::chrono::duration<double> allowed(config_.attach_max_time);
   change_deadline_ = std::chrono::steady_clock::now() +
                      std::chrono::duration_cast<std::chrono::steady_clock::duration>(allowed);
 }
@@ -78,10 +80,8 @@ std::string ModelLoader::attach(const std::string& name, const ObjectReader& rea
 std::string ModelLoader::attach_read(const std::string& name, const ObjectReader& read) {
   const auto state = this->state();
   if (!state->is_ready()) return not_ready(*state);
-  const auto limit = static_cast<std::size_t>(config_.attach.max_objects);
-  if (state->objects.size() >= limit) {
-    return std::to_string(limit) +
-           " objects are attached, which is the limit (~attach/max_objects); detach some";
+  if (state->objects.size() >= kMostAttached) {
+    return std::to_string(kMostAttached) + " objects are attached, which is the limit; detach some";
   }
   for (const AttachedObject& other : state->objects) {
     if (other.name != name) continue;

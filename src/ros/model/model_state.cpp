@@ -1,8 +1,11 @@
 #include "ros/model/model_state.h"
 
+#include <set>
 #include <unordered_set>
 
+#include "internal/geometry/limits.h"
 #include "ros/common/frame_name.h"
+#include "ros/common/text.h"
 
 namespace ist {
 
@@ -23,6 +26,17 @@ std::vector<std::string> link_names(const RobotModel& robot) {
   std::vector<std::string> names;
   for (const LinkModel& link : robot.links) names.push_back(link.name);
   return names;
+}
+
+std::string unmonitored_name(const std::vector<std::string>& names, const ModelState& model) {
+  const std::set<std::string> known(model.links.begin(), model.links.end());
+  for (const std::string& name : names) {
+    if (known.count(name) > 0) continue;
+    const std::string nearest = nearest_name(name, known);
+    return "'" + printable(name) + "' is no monitored link" +
+           (nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
+  }
+  return "";
 }
 
 std::vector<bool> wanted_links(const ModelState& model) {

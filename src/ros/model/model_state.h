@@ -71,6 +71,9 @@ std::string fixed_frame_of(const ModelState& model, const ServerConfig& config);
 /// Names by link of the robot.
 std::vector<std::string> link_names(const RobotModel& robot);
 
+/// The sentence about the first name that is none of the monitored links; empty: all are.
+std::string unmonitored_name(const std::vector<std::string>& names, const ModelState& model);
+
 /// By link of model.robot: true for monitored links with usable geometry, whose poses are needed.
 std::vector<bool> wanted_links(const ModelState& model);
 

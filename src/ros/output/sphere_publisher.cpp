@@ -8,7 +8,6 @@
 
 #include "ros/common/publish.h"
 #include "ros/output/markers.h"
-#include "ros/output/nearest_summary.h"
 
 namespace ist {
 namespace {
@@ -31,20 +30,7 @@ SpherePublisher::SpherePublisher(ros::NodeHandle private_nh)
 
 void SpherePublisher::show(const ModelState& model) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  draw(model);
-}
-
-void SpherePublisher::show_finer(const ModelState& model) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (model.robot == shown_robot_ || !model.robot || !shown_robot_ ||
-      !same_geometry(*model.robot, *shown_robot_)) {
-    return;  // another model is shown by the cycle
-  }
-  draw(model);
-}
-
-/// The caller holds mutex_.
-void SpherePublisher::draw(const ModelState& model) {
+  if (model.robot == shown_robot_) return;
   shown_robot_ = model.robot;
   if (!shown_.markers.empty()) publish_message(publisher_, deleted(shown_));
   shown_.markers.clear();

@@ -20,12 +20,9 @@ class SpherePublisher {
  public:
   explicit SpherePublisher(ros::NodeHandle private_nh);
 
-  /// Shows the monitored links of a model; none while it is not ready.
+  /// Shows the monitored links of a model, if that is not shown already; none while there is no
+  /// robot. It is called by a slow thread, whose rate bounds how often the markers change.
   void show(const ModelState& model);
-
-  /// Shows the finer packings of a model that is shown already, if there are any. It is called by a
-  /// slow thread, whose rate bounds how often the markers change.
-  void show_finer(const ModelState& model);
 
   /// Colours the links' spheres by nearness, as ~markers are, at most twice a second. Only where a
   /// link's colour has changed and somebody listens, because all spheres are sent again.
@@ -39,8 +36,6 @@ class SpherePublisher {
   void repeat_when_due();
 
  private:
-  void draw(const ModelState& model);
-
   using Clock = std::chrono::steady_clock;
 
   ros::Publisher publisher_;

@@ -22,10 +22,8 @@ using dynamic_reconfigure::Reconfigure;
 using XmlRpc::XmlRpcValue;
 
 constexpr char kOnlyGroup[] = "Default";
-constexpr const char* kGroups[] = {"query", "repulsion", "penetration", "speed_scale",
-                                   "speed_scale/separation"};
-constexpr char kKept[] =
-    "the last valid ~query, ~repulsion, ~penetration and ~speed_scale stay in use: ";
+constexpr const char* kGroups[] = {"query", "repulsion", "speed_scale", "speed_scale/separation"};
+constexpr char kKept[] = "the last valid ~query, ~repulsion and ~speed_scale stay in use: ";
 constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
 
 /// A group is a dictionary, without the dictionaries in it.

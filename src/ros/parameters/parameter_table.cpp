@@ -20,6 +20,12 @@ namespace {
 // - ViewFilterConfig: errors of a calibrated camera; the filter finds the rest, and tells doubts.
 // - MemoryConfig::max_range: farther rays cost time, and reach no arm.
 // - IngestConfig::sensor_range and kMinMeasured tell a broken sensor, not how good it is.
+// - IngestConfig::max_points and OctreeLimits::max_bytes are more than any sensor or map of
+//   max_leaves has; they keep a broken message from taking the memory.
+// - ExtentConfig::calibration_angle is a sensor model's own; a mounting's error is calibration.
+// - PenetrationConfig::stiffness scales all wrenches alike, as a reader can.
+// - kMostAttached: each object is packed, and measured by every query.
+// - A memory is in ~fixed_frame, which stands still for a robot that drives, too.
 
 // The ranges that a parameter accepts are much wider than its slider, which ends where robots and
 // cameras need it to, so that a pixel means something.
@@ -99,21 +105,14 @@ std::vector<Parameter> answer_parameters(ServerConfig* config) {
           "Obstacles this much farther than the nearest one still push. Larger is smoother.", 0.5),
       row("penetration/enabled", choice(&config->contacts_wanted, {"auto", "true", "false"}),
           "Links with a contact wrench; auto: those within repulsion/influence_distance so far."),
-      row("penetration/stiffness", &config->penetration.stiffness,
-          Range::non_negative("N/m^3", 1e12),
-          "Contact force per volume that link and obstacle share.", 1e6),
       row("self_collision/enabled", &self.enabled,
           "Distances from link to link, on ~self_proximity."),
       row("self_collision/rate", &self.rate, {"Hz", 0.01, 1000.0}, "How often they come."),
       row("self_collision/ignore", &self.ignore,
           "Pairs to leave out, [[a, b], [c, d]], besides neighbours and what an SRDF disables."),
-      row("self_collision/ignore_contact_at_rest", &self.ignore_contact_at_rest,
-          "Pairs that touch with all joints at zero are not watched; the log names them."),
       row("self_collision/in_minimum", &self.in_minimum,
           "They count in ~min_distance, ~speed_scale and ~joint_repulsion."),
-      row("attach/max_objects", &config->attach.max_objects, Range::non_negative("", 1e4),
-          "Objects that ~attach_object attaches at a time; every query measures them."),
-      row("attach/max_time", &config->attach.max_time, Range::positive("s", 3600.0),
+      row("attach/max_time", &config->attach_max_time, Range::positive("s", 3600.0),
           "Reading and packing an object may take no longer."),
       row("joint_deceleration/default", &config->deceleration.other,
           Range::non_negative("rad/s^2 or m/s^2", 1e3),
@@ -199,7 +198,6 @@ WordOr footprint_choice(ExtentConfig* extent) {
 std::vector<Parameter> sensor_parameters(const std::string& at, SourceConfig* source) {
   IngestConfig& ingest = source->ingest;
   ExtentConfig& extent = ingest.extent;
-  const Range angle = Range::non_negative("rad", 0.5);
   return {
       row(at + "min_range", &ingest.min_range, Range::non_negative("m", 1e4),
           "Points nearer to the sensor are left out."),
@@ -219,10 +217,8 @@ std::vector<Parameter> sensor_parameters(const std::string& at, SourceConfig* so
           "A range's standard deviation is a + b range^2; three of them belong to a point."),
       row(at + "noise/b", &extent.noise_quadratic, Range::non_negative("1/m", 1.0), ""),
       row(at + "noise/calibration", &extent.calibration, kShort,
-          "Error of its position and ranges; half the diagonal of a voxel filter, too."),
-      row(at + "noise/calibration_angle", &extent.calibration_angle, angle,
-          "Error of its orientation."),
-      row(at + "footprint", footprint_choice(&extent), angle,
+          "Error of its pose and ranges; half the diagonal of a voxel filter, too."),
+      row(at + "footprint", footprint_choice(&extent), Range::non_negative("rad", 0.5),
           "The surface between points: camera, by the camera_info or the scan; or their angle."),
       row(at + "latency", &extent.latency, Range::non_negative("s", 10.0),
           "From measurement to stamp; obstacles move at 1.6 m/s, as a walking person."),
@@ -244,12 +240,8 @@ std::vector<Parameter> image_parameters(const std::string& at, SourceConfig* sou
       row(at + "memory/resolution", &memory.map.resolution, {"m", 0.001, 1.0}, "Edge of a voxel."),
       row(at + "memory/max_nodes", &memory.map.max_nodes, {"", 4096.0, 1e9},
           "Voxels that there is memory for, 8.6 bytes each; the oldest go first."),
-      row(at + "memory/frame_id", &memory.frame_id,
-          "A frame that stands still, for a robot that drives. Default: the fixed frame."),
       row(at + "memory/file", Path{&memory.file},
           "Absolute path of a .bt file: read at the start, written by ~save_memory."),
-      row(at + "max_points", &source->ingest.max_points, {"", 1.0, 1e9},
-          "A message of more points or pixels is refused."),
   };
 }
 
@@ -265,8 +257,6 @@ std::vector<Parameter> map_parameters(const std::string& at, SourceConfig* sourc
       row(at + "latency", &extent.latency, Range::non_negative("s", 10.0)),
       row(at + "max_leaves", &source->map.max_leaves, {"", 1.0, 5e7},
           "A map of more occupied leaves is refused."),
-      row(at + "max_bytes", &source->map.max_bytes, {"", 1.0, 2e9},
-          "A map, or its file, of more is refused."),
   };
 }
 
@@ -283,8 +273,7 @@ std::vector<Parameter> world_parameters(const std::string& at, SourceConfig* sou
           "Its links' frames in tf are this and the link's name."),
       row(at + "robot/joint_states", &robot.joint_states,
           "Its topic. Default: the poses of its links come from tf."),
-      row(at + "margin", &world.margin, kMargin,
-          "Of objects that state none. For links: link_margins: {gripper_link: 0.01}."),
+      row(at + "margin", &world.margin, kMargin, "Of objects that state none."),
       row(at + "allowed_contacts", &world.allowed_contacts,
           "Pairs of a link and an object that may touch, [[base_link, table]]."),
       row(at + "max_objects", &world.limits.max_objects, {"", 1.0, 1e6},
@@ -374,7 +363,7 @@ std::vector<Parameter> object_parameters(const std::string& at, WrittenObject* w
   append({row(at + "frame_id", &object.frame, "Default: that of the source."),
           row(at + "position", Numbers{written->position.data(), 3}, position),
           row(at + "rpy", Numbers{written->rpy.data(), 3}, {"rad", -100.0, 100.0},
-              "Roll, pitch and yaw. In its place, orientation: [x, y, z, w]."),
+              "Roll, pitch and yaw."),
           row(at + "margin", &object.margin, kMargin)},  // the last one: zones have none
          &table);
   return table;

@@ -94,8 +94,8 @@ void check_unknown_space(ParameterReader* reader, const ServerConfig& config) {
     if (!source.ingest.self_filter) {
       refuse("the robot's place is needed; '" + source.name + "' has self_filter: false");
     }
-    if (memory.map.resolution != first->map.resolution || memory.frame_id != first->frame_id) {
-      refuse("all memories need the same resolution and frame_id; '" + source.name + "' differs");
+    if (memory.map.resolution != first->map.resolution) {
+      refuse("all memories need the same resolution; '" + source.name + "' differs");
     }
   }
   if (first == nullptr) refuse("a memory says what has been seen; set ~memory/enabled");

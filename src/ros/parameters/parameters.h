@@ -35,8 +35,7 @@ struct SelfCollisionConfig {
   bool enabled = false;
   double rate = 50.0;  ///< [Hz] of ~self_proximity; > 0
   std::vector<std::pair<std::string, std::string>>
-      ignore;                          ///< pairs of links to leave out, besides adjacent ones
-  bool ignore_contact_at_rest = true;  ///< leave out pairs in contact with all joints at zero
+      ignore;  ///< pairs of links to leave out, besides adjacent ones
   /// Its links count in ~min_distance, ~speed_scale and ~joint_repulsion.
   bool in_minimum = false;
 };
@@ -64,12 +63,6 @@ QueryConfig default_query();
 /// @param period     [s] from one cycle to the next
 double deadline_of(double parameter, double period);
 
-/// Limits of ~attach_object.
-struct AttachConfig {
-  int max_objects = 100;  ///< attached at a time: each is packed, and measured by every query; >= 0
-  double max_time = 30.0;  ///< [s] for one object, reading and packing it included; > 0
-};
-
 /// ~joint_deceleration: with how much [rad/s^2, m/s^2] joints brake at least; 0: not known.
 struct JointDeceleration {
   double other = 0.0;                      ///< of joints that are not in by_joint
@@ -91,7 +84,6 @@ struct TrajectoryConfig {
 struct LiveConfig {
   QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
   RepulsionConfig repulsion;
-  PenetrationConfig penetration;
   SpeedScaleConfig speed_scale;
   /// The contact bodies that are packed so far; may be null. This is no parameter.
   std::shared_ptr<const ContactModel> contacts;
@@ -111,7 +103,7 @@ struct ServerConfig : LiveConfig {
   bool self_filter_all = false;
   ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   SelfCollisionConfig self_collision;
-  AttachConfig attach;
+  double attach_max_time = 30.0;  ///< [s] of ~attach_object, reading and packing included; > 0
   JointDeceleration deceleration;
   TrajectoryConfig trajectory;
   /// Links that do not count in ~min_distance, ~speed_scale and the summary of the diagnostics.

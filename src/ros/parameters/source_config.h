@@ -29,8 +29,7 @@ const char* noun(SourceType type);
 struct SourceMemoryConfig {
   bool enabled = false;
   MemoryConfig map;
-  std::string frame_id;  ///< that stands still in the world; empty: the fixed frame
-  std::string file;      ///< absolute path of a .bt file; empty: nothing is kept
+  std::string file;  ///< absolute path of a .bt file; empty: nothing is kept
 };
 
 /// Depth cameras have 10 to 60 % of pixels without a measurement, and lidars up to 85 %, where they
@@ -58,8 +57,7 @@ struct WorldConfig {
   OtherRobotConfig robot;
   bool has_topic = false;  ///< whether its topic is subscribed to
   WorldLimits limits;
-  double margin = 0.0;                         ///< [m] of objects that state none
-  std::map<std::string, double> link_margins;  ///< [m] by name of a link
+  double margin = 0.0;  ///< [m] of objects that state none
   /// Pairs of a link and an object that may touch.
   std::vector<std::pair<std::string, std::string>> allowed_contacts;
 };

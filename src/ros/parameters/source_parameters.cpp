@@ -1,6 +1,7 @@
 #include "ros/parameters/source_parameters.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -13,6 +14,12 @@ namespace ist {
 namespace {
 
 using XmlRpc::XmlRpcValue;
+
+// By type.
+constexpr const char* kMessages[] = {"sensor_msgs/PointCloud2", "sensor_msgs/Image",
+                                     "sensor_msgs/LaserScan", "octomap_msgs/Octomap",
+                                     "ist_proximity/WorldObjects"};
+constexpr const char* kNouns[] = {"cloud", "image", "scan", "map", "world"};
 
 /// The paddings by link, and the largest, which is that of Ingest.
 void read_paddings(ParameterReader* reader, const std::string& at, SourceConfig* source) {
@@ -135,6 +142,20 @@ void check_memories(ParameterReader* reader, const std::vector<SourceConfig>& so
 }
 
 }  // namespace
+
+const char* message_type(SourceType type) { return kMessages[static_cast<int>(type)]; }
+
+const char* noun(SourceType type) { return kNouns[static_cast<int>(type)]; }
+
+bool SourceConfig::is_permanent() const {
+  const bool stays = type == SourceType::kMap || type == SourceType::kWorld;
+  return stays && (!file.empty() || std::isinf(timeout));
+}
+
+bool SourceConfig::has_zones() const {
+  const bool measures = type != SourceType::kMap && type != SourceType::kWorld;
+  return measures && !std::isinf(timeout) && ingest.self_filter_mode != SelfFilterMode::kView;
+}
 
 std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   // Parameters beside ~sources belong to the single source; with ~sources they are its defaults.

@@ -1,9 +1,7 @@
 #include <Eigen/Geometry>
-#include <cmath>
 #include <string>
 #include <vector>
 
-#include "internal/geometry/numbers.h"
 #include "ist_proximity/proximity/world_file.h"
 #include "ros/common/text.h"
 #include "ros/parameters/parameter_table.h"
@@ -12,24 +10,11 @@
 namespace ist {
 namespace {
 
-Eigen::Isometry3d read_pose(ParameterReader* reader, const std::string& at,
-                            const WrittenObject& written) {
-  Eigen::Quaterniond q = Eigen::AngleAxisd(written.rpy[2], Eigen::Vector3d::UnitZ()) *
-                         Eigen::AngleAxisd(written.rpy[1], Eigen::Vector3d::UnitY()) *
-                         Eigen::AngleAxisd(written.rpy[0], Eigen::Vector3d::UnitX());
-  if (reader->has(at + "orientation")) {  // in memory x, y, z, w
-    q = Eigen::Quaterniond::Identity();
-    reader->read({at + "orientation", Numbers{q.coeffs().data(), 4}, {"", -1.001, 1.001}});
-    if (reader->has(at + "rpy")) {
-      reader->add_error(at + "rpy", "and ~" + at + "orientation are both set: one is needed");
-    }
-  }
-  if (!(std::abs(q.norm() - 1.0) < 1e-3)) {
-    reader->add_error(at + "orientation", "has a length of " + number_text(q.norm()) +
-                                              ": a quaternion x, y, z, w of length 1 is needed");
-    q.setIdentity();
-  }
-  return Eigen::Translation3d(written.position) * q.normalized();
+Eigen::Isometry3d pose_of(const WrittenObject& written) {
+  return Eigen::Translation3d(written.position) *
+         Eigen::AngleAxisd(written.rpy[2], Eigen::Vector3d::UnitZ()) *
+         Eigen::AngleAxisd(written.rpy[1], Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(written.rpy[0], Eigen::Vector3d::UnitX());
 }
 
 /// Sizes have no defaults.
@@ -65,7 +50,7 @@ void read_object(ParameterReader* reader, const std::string& at, bool has_margin
   if (!has_margin) rows.pop_back();
   reader->read_all(rows);
   require_sizes(reader, at, rows, config->mesh);
-  config->object.X_BO = read_pose(reader, at, written);
+  config->object.X_BO = pose_of(written);
   if (written.shape == WrittenObject::kShapes.size()) {
     if (reader->has(at + "shape")) return;
     reader->add_error(at + "shape", "is not set: allowed is " + join(WrittenObject::kShapes, ", "));
@@ -100,10 +85,6 @@ void read_placed_shape(ParameterReader* reader, const std::string& at, WorldObje
 
 void read_world(ParameterReader* reader, const std::string& at, SourceConfig* source) {
   WorldConfig& world = source->world;
-  for (const std::string& link : reader->children(at + "link_margins")) {
-    reader->read({at + "link_margins/" + link, &world.link_margins[link],
-                  Range::non_negative("m", kMaxLength)});
-  }
   read_objects(reader, at, &world);
   if (reader->has(at + "robot") && world.robot.description.empty()) {
     reader->add_error(at + "robot/description",

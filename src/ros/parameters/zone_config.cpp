@@ -16,23 +16,12 @@ namespace {
 constexpr double kMostSize = 10.0;
 constexpr double kLongestLifetime = 1e6;  // [s]
 
-std::vector<double> sizes_of(const Shape& shape) {
-  if (const auto* box = std::get_if<Box>(&shape)) {
-    return {box->size.x(), box->size.y(), box->size.z()};
-  }
-  if (const auto* sphere = std::get_if<Sphere>(&shape)) return {2.0 * sphere->radius};
-  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
-    return {2.0 * cylinder->radius, cylinder->length};
-  }
-  return {};
-}
-
 std::string zone_fault(const ZoneConfig& zone) {
   std::string fault = name_fault(zone.name);
   if (!fault.empty()) return "its name " + fault;
   fault = name_fault(zone.frame);
   if (!fault.empty()) return "its frame " + fault;
-  const std::vector<double> sizes = sizes_of(zone.shape);
+  const std::vector<double> sizes = zone_sizes(zone.shape);
   if (sizes.empty()) return "its shape is no box, cylinder or sphere";
   for (const double size : sizes) {
     if (size > 0.0 && size <= kMostSize) continue;
@@ -49,6 +38,17 @@ std::string zone_fault(const ZoneConfig& zone) {
 }
 
 }  // namespace
+
+std::vector<double> zone_sizes(const Shape& shape) {
+  if (const auto* box = std::get_if<Box>(&shape)) {
+    return {box->size.x(), box->size.y(), box->size.z()};
+  }
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return {2.0 * sphere->radius};
+  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
+    return {2.0 * cylinder->radius, cylinder->length};
+  }
+  return {};
+}
 
 std::string zones_fault(const std::vector<ZoneConfig>& zones) {
   std::set<std::set<std::string>> sets;

@@ -24,6 +24,10 @@ constexpr std::size_t kMostZones = 32;
 /// Zones may name so many sets of links: each set is one more look at every cloud.
 constexpr std::size_t kMostLinkSets = 4;
 
+/// [m] The sizes of a shape that a zone may have, which tell it from others of its kind; empty: no
+/// zone has such a shape.
+std::vector<double> zone_sizes(const Shape& shape);
+
 /// Says what is wrong with the zones, with the name of the one that it is wrong with. Empty: they
 /// can be used.
 std::string zones_fault(const std::vector<ZoneConfig>& zones);

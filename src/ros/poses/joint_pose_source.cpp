@@ -26,14 +26,9 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
                                  const TransformBuffer& buffer, const std::string& fixed_frame,
                                  const std::vector<std::string>& links,
                                  const std::vector<bool>& wanted, double timeout)
-    : kinematics_(std::move(kinematics)),
+    : KinematicPoseSource(std::move(kinematics), buffer, fixed_frame, links, wanted, timeout),
       listener_(*joints),
       which_(which),
-      buffer_(buffer),
-      fixed_frame_(fixed_frame),
-      placer_(kinematics_, links),
-      wanted_(wanted),
-      timeout_(timeout),
       tf_source_(buffer, fixed_frame, links, wanted, timeout) {
   const auto& tree = kinematics_->joints();
   moved_by_.resize(links.size());
@@ -201,9 +196,8 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
     *poses = last_;
     return;
   }
-  poses->reset(now, placer_.size());
+  reset(now, poses);
   tf_is_behind_ = false;
-  placer_.reset();
   if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
   if (!instant.isZero() && instant < last) {
     poses->stamp = last;
@@ -219,10 +213,9 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
                                      kinematics_->bodies()[joints[j].child], now, instant,
                                      &joints_.X_PC[j], &joint_problems_[j]);
   }
-  Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();
   PoseProblem root_problem;
   const bool root_known =
-      look_up_in_tf(fixed_frame_, kinematics_->bodies()[0], now, instant, &X_FR, &root_problem);
+      look_up_in_tf(fixed_frame_, kinematics_->bodies()[0], now, instant, &X_FR_, &root_problem);
   // A mimic joint is unknown for the same reason as the joint that it follows, or its own.
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints[j].source == j) continue;
@@ -234,7 +227,7 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
     poses->stamp = last;
     look_up_behind(now, poses);
   } else if (root_known) {
-    placer_.place(joints_, X_FR, wanted_, joint_problems_, poses);
+    place(joint_problems_, poses);
   } else {
     poses->set_problem(wanted_, root_problem);
   }
@@ -258,7 +251,7 @@ void JointPoseSource::look_up_behind(const ros::Time& now, StampedLinkPoses* pos
 void JointPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,
                                   BodyPoses* bodies) {
   if (tf_is_behind_) return tf_source_.look_up_all(kinematics, instant, bodies);
-  *bodies = placer_.bodies();
+  KinematicPoseSource::look_up_all(kinematics, instant, bodies);
 }
 
 std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,

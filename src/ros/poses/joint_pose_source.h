@@ -8,10 +8,8 @@
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
-#include "ros/poses/link_placer.h"
-#include "ros/poses/pose_source.h"
+#include "ros/poses/kinematic_pose_source.h"
 #include "ros/poses/tf_pose_source.h"
-#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -27,7 +25,7 @@ namespace ist {
 /// The poses of planar and floating joints, and of the root link in the fixed frame, come from tf
 /// at the same instant. While tf is behind the joint states, all poses are those of the newest
 /// instant at which both tf and the joints are known. The instant never goes back.
-class JointPoseSource : public PoseSource {
+class JointPoseSource : public KinematicPoseSource {
  public:
   /// @param joints       feeds `buffer`; both outlive this
   /// @param which        the joint states that look_up() uses
@@ -57,24 +55,17 @@ class JointPoseSource : public PoseSource {
   bool look_up_in_tf(const std::string& parent, const std::string& child, const ros::Time& now,
                      const ros::Time& instant, Eigen::Isometry3d* X, PoseProblem* problem);
 
-  std::shared_ptr<const Kinematics> kinematics_;
   JointStateListener& listener_;
   const JointStateListener::Which which_;
-  const TransformBuffer& buffer_;
-  std::string fixed_frame_;
-  LinkPlacer placer_;
-  std::vector<bool> wanted_;
   std::vector<std::vector<std::size_t>> moved_by_;  ///< by link: the joints whose positions move it
   std::vector<bool> matters_;                       ///< by joint: whether it moves a wanted link
-  double timeout_;
-  TfPoseSource tf_source_;  ///< used while tf is behind
+  TfPoseSource tf_source_;                          ///< used while tf is behind
 
   // Valid for one look_up().
   JointPositions positions_;
   std::vector<double> q_;                    ///< by joint; NaN where it is not known
   std::vector<double> velocities_;           ///< likewise, or empty
   std::vector<PoseProblem> joint_problems_;  ///< by joint
-  JointPoses joints_;
   bool tf_is_behind_ = false;
   StampedLinkPoses last_;  ///< the result of the last look_up()
 };

@@ -10,12 +10,8 @@ namespace ist {
 StatedPoseSource::StatedPoseSource(std::shared_ptr<const Kinematics> kinematics,
                                    const TransformBuffer& buffer, const std::string& fixed_frame,
                                    const std::vector<std::string>& links, double timeout)
-    : kinematics_(std::move(kinematics)),
-      buffer_(buffer),
-      fixed_frame_(fixed_frame),
-      placer_(kinematics_, links),
-      wanted_(links.size(), true),
-      timeout_(timeout),
+    : KinematicPoseSource(std::move(kinematics), buffer, fixed_frame, links,
+                          std::vector<bool>(links.size(), true), timeout),
       q_(kinematics_->joints().size(), std::nan("")) {}
 
 std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration) {
@@ -48,8 +44,7 @@ std::string StatedPoseSource::hint() const {
 }
 
 void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
-  poses->reset(now, placer_.size());
-  placer_.reset();
+  reset(now, poses);
   root_known_ = false;
   kinematics_->place_joints(q_, &joints_);
   if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
@@ -71,12 +66,7 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
           "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
     }
   }
-  placer_.place(joints_, X_FR_, wanted_, joint_problems, poses);
-}
-
-void StatedPoseSource::look_up_all(const Kinematics& /*kinematics*/, const ros::Time& /*instant*/,
-                                   BodyPoses* bodies) {
-  *bodies = placer_.bodies();
+  place(joint_problems, poses);
 }
 
 }  // namespace ist

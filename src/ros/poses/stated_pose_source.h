@@ -6,17 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/robot/kinematics.h"
-#include "ros/poses/link_placer.h"
-#include "ros/poses/pose_source.h"
-#include "ros/poses/transform_buffer.h"
+#include "ros/poses/kinematic_pose_source.h"
 
 namespace ist {
 
 /// Link poses of a configuration that a request states; the robot need not be in it. Joints that
 /// the request leaves out, planar and floating joints, and the pose of the root link in the fixed
 /// frame come from tf as they are now.
-class StatedPoseSource : public PoseSource {
+class StatedPoseSource : public KinematicPoseSource {
  public:
   /// @param buffer       outlives this
   /// @param fixed_frame  frame F
@@ -41,21 +38,11 @@ class StatedPoseSource : public PoseSource {
   bool is_root_known() const { return root_known_; }       ///< whether joints() and X_FR() hold
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
-  void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                   BodyPoses* bodies) override;
   bool is_stated() const override { return true; }
   std::string hint() const override;
 
  private:
-  std::shared_ptr<const Kinematics> kinematics_;
-  const TransformBuffer& buffer_;
-  std::string fixed_frame_;
-  LinkPlacer placer_;
-  std::vector<bool> wanted_;
-  double timeout_;
   std::vector<double> q_;  ///< by joint; NaN where it is left out
-  JointPoses joints_;
-  Eigen::Isometry3d X_FR_ = Eigen::Isometry3d::Identity();
   bool root_known_ = false;
 };
 

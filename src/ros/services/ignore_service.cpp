@@ -2,9 +2,6 @@
 
 #include <ros/console.h>
 
-#include <algorithm>
-
-#include "internal/geometry/limits.h"
 #include "ros/common/text.h"
 
 namespace ist {
@@ -33,14 +30,7 @@ std::string IgnoreService::fault_of(const ist_proximity::IgnoreLinks::Request& r
                        request.lifetime, kLongest);
   }
   if (request.links.empty()) return "links is empty: name those that are to be left out";
-  const std::vector<std::string> known = loader_.state()->links;
-  for (const std::string& name : request.links) {
-    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    const std::string nearest = nearest_name(name, {known.begin(), known.end()});
-    return "'" + printable(name) + "' is no monitored link" +
-           (nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
-  }
-  return "";
+  return unmonitored_name(request.links, *loader_.state());
 }
 
 bool IgnoreService::ignore(ist_proximity::IgnoreLinks::Request& request,

@@ -16,6 +16,8 @@ namespace {
 
 using PairMessage = ist_proximity::LinkPair;
 
+constexpr std::chrono::milliseconds kPollModel(200);
+
 // What was found of a pair; null: it was not sampled.
 const SampledPair* find(const std::vector<SampledPair>& sampled, const LinkPair& pair) {
   const auto found = std::find_if(sampled.begin(), sampled.end(), [&](const SampledPair& one) {
@@ -42,8 +44,9 @@ std::string text_of(const std::vector<SampledPair>& sampled, std::size_t configu
 
 }  // namespace
 
-LinkPairService::LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config)
-    : config_(config) {
+LinkPairService::LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config,
+                                 const ModelLoader& loader)
+    : config_(config), loader_(loader) {
   service_ = private_nh.advertiseService("link_pairs", &LinkPairService::answer, this);
   thread_ = std::thread(&LinkPairService::run, this);
 }
@@ -53,55 +56,37 @@ LinkPairService::~LinkPairService() {
   thread_.join();
 }
 
-void LinkPairService::set_model(std::shared_ptr<const ModelState> model) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    // Finer packings change nothing here.
-    if (newest_model_ && model && is_refinement(*newest_model_, *model)) return;
-    newest_model_ = std::move(model);
-    is_new_ = true;
-    findings_.reset();
-  }
-  stop_signal_.notify();
-}
-
 void LinkPairService::run() {
   name_thread("ist sampling");
   lower_thread_priority();
-  constexpr std::chrono::hours kLong(1);
-  const auto has_model = [this] {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return is_new_;
-  };
-  while (stop_signal_.sleep_until(StopSignal::Clock::now() + kLong, has_model)) {
-    const std::string fault = exception_of([this] { sample_newest(); });
+  std::shared_ptr<const ModelState> model;
+  while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPollModel)) {
+    if (model && !is_outdated(*model)) continue;
+    model = loader_.state();
+    const std::string fault = exception_of([&] { sample_newest(model); });
     if (!fault.empty()) ROS_ERROR_STREAM("link pairs are not listed: " << fault);
   }
 }
 
-void LinkPairService::sample_newest() {
+void LinkPairService::sample_newest(const std::shared_ptr<const ModelState>& model) {
+  if (!model->is_ready() || !model->kinematics) return;
   Findings findings;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    is_new_ = false;
-    findings.model = newest_model_;
-  }
-  const auto& model = findings.model;
-  if (!model || !model->is_ready() || !model->kinematics) return;
+  findings.model = model;
   findings.chosen = choose_pairs(config_, model, [&] { return is_outdated(*model); }).all;
   findings.problem = "the pairs are being sampled";
   const auto show = [&] {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (newest_model_ == model) findings_ = std::make_shared<const Findings>(findings);
+    findings_ = std::make_shared<const Findings>(findings);
   };
   show();
   sample(&findings);
   show();
 }
 
+/// Finer packings change nothing here.
 bool LinkPairService::is_outdated(const ModelState& model) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return stop_signal_.stopped() || newest_model_.get() != &model;
+  const auto newest = loader_.state();
+  return stop_signal_.stopped() || (newest.get() != &model && !is_refinement(model, *newest));
 }
 
 void LinkPairService::sample(Findings* findings) {
@@ -140,9 +125,7 @@ void LinkPairService::sample(Findings* findings) {
   ROS_WARN_STREAM(
       "self-collision: in contact with all joints at zero, and therefore not watched, "
       "but apart in other configurations: "
-      << apart
-      << "; set ~self_collision/ignore_contact_at_rest to false, and name the pairs "
-         "that really are to be left out in ~self_collision/ignore or an SRDF");
+      << apart << "; enable_collisions of an SRDF watches them");
 }
 
 /// Names the pairs that are left out as in contact at rest, though they are often apart.
@@ -166,15 +149,14 @@ bool LinkPairService::answer(Service::Request& request, Service::Response& respo
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     findings = findings_;
-    if (!findings) {
-      const bool is_ready = newest_model_ && newest_model_->is_ready();
-      response.message = is_ready && newest_model_->kinematics ? "the pairs are being chosen"
-                         : is_ready                            ? no_kinematics(*newest_model_)
-                         : newest_model_                       ? newest_model_->problem
-                                         : "the robot's model is not ready yet";
-    }
   }
-  if (!findings) return true;
+  if (!findings || is_outdated(*findings->model)) {
+    const auto model = loader_.state();
+    response.message = !model->is_ready()  ? model->problem
+                       : model->kinematics ? "the pairs are being chosen"
+                                           : no_kinematics(*model);
+    return true;
+  }
   response.success = true;
   response.message = findings->problem;
   const RobotModel& robot = *findings->model->robot;

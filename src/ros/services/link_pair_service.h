@@ -11,7 +11,7 @@
 
 #include "ist_proximity/proximity/self_query.h"
 #include "ros/common/stop_signal.h"
-#include "ros/model/model_state.h"
+#include "ros/model/model_loader.h"
 #include "ros/parameters/parameters.h"
 #include "ros/services/pair_choice.h"
 
@@ -22,11 +22,10 @@ namespace ist {
 /// the cache. Sampling informs; it leaves no pair out.
 class LinkPairService {
  public:
-  LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config);
+  /// @param loader  outlives this
+  LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config,
+                  const ModelLoader& loader);
   ~LinkPairService();
-
-  /// Thread safe.
-  void set_model(std::shared_ptr<const ModelState> model);
 
  private:
   using Service = ist_proximity::ListLinkPairs;
@@ -40,17 +39,16 @@ class LinkPairService {
   };
 
   void run();
-  void sample_newest();
+  void sample_newest(const std::shared_ptr<const ModelState>& model);
   void sample(Findings* findings);
   static std::string left_out_though_apart(const Findings& findings);
   bool is_outdated(const ModelState& model) const;
   bool answer(Service::Request& request, Service::Response& response);
 
   const ServerConfig config_;
-  StopSignal stop_signal_;    ///< a new model is its event
-  mutable std::mutex mutex_;  ///< guards the next three members
-  std::shared_ptr<const ModelState> newest_model_;
-  bool is_new_ = false;
+  const ModelLoader& loader_;
+  StopSignal stop_signal_;
+  std::mutex mutex_;                          ///< guards the next one
   std::shared_ptr<const Findings> findings_;  ///< null before the first model
   ros::ServiceServer service_;
   std::thread thread_;

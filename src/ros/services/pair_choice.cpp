@@ -76,10 +76,8 @@ PairChoice choose_pairs(const ServerConfig& config,
   const std::vector<LinkPair> candidates = pairs_by({}, only_enabled);
   const std::vector<LinkPair> not_ignored = pairs_by(config.self_collision.ignore, only_enabled);
   const std::vector<LinkPair> left = pairs_by(config.self_collision.ignore, rules);
-  std::vector<LinkPair> at_rest;
-  if (config.self_collision.ignore_contact_at_rest) {
-    at_rest = in_contact_at_rest(model.robot, *model.kinematics, left, cancelled);
-  }
+  const std::vector<LinkPair> at_rest =
+      in_contact_at_rest(model.robot, *model.kinematics, left, cancelled);
   const auto reason_of = [&](const LinkPair& pair) {
     if (!wanted[pair.first] || !wanted[pair.second]) return PairReason::kUnusable;
     if (!holds(candidates, pair)) return PairReason::kAdjacent;

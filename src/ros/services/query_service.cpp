@@ -39,13 +39,13 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 }  // namespace
 
 QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
-                           const CloudSources& sources, const TransformBuffer& buffer,
-                           std::function<LiveConfig()> live, UnknownSpaceWatch* watch,
-                           std::function<void()> meanwhile)
+                           const ModelLoader& loader, const CloudSources& sources,
+                           const TransformBuffer& buffer, std::function<LiveConfig()> live,
+                           UnknownSpaceWatch* watch, std::function<void()> meanwhile)
     : config_(config),
       live_(std::move(live)),
       meanwhile_(std::move(meanwhile)),
-      stated_(config, sources, buffer, watch),
+      stated_(config, loader, sources, buffer, watch),
       self_(config) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);

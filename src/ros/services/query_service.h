@@ -8,7 +8,6 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "ros/common/callback_thread.h"
@@ -23,18 +22,16 @@ namespace ist {
 /// memory.
 class QueryService {
  public:
-  /// @param sources, buffer  outlive this
+  /// @param loader, sources, buffer  outlive this
   /// @param watch            outlives this; null with ~unknown_space free
   /// @param live             gives the present configuration; called from the service's thread
   /// @param meanwhile        what else that thread does: called 20 times a second or more often,
   ///                         also during a long request; throws nothing
-  QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const CloudSources& sources,
-               const TransformBuffer& buffer, std::function<LiveConfig()> live,
-               UnknownSpaceWatch* watch, std::function<void()> meanwhile);
+  QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const ModelLoader& loader,
+               const CloudSources& sources, const TransformBuffer& buffer,
+               std::function<LiveConfig()> live, UnknownSpaceWatch* watch,
+               std::function<void()> meanwhile);
   ~QueryService();
-
-  /// Thread safe.
-  void set_model(std::shared_ptr<const ModelState> model) { stated_.set_model(std::move(model)); }
 
   /// Ends the service's thread.
   void stop() { thread_.stop(); }

@@ -24,9 +24,9 @@ using ist_proximity::ProximityArrayConstPtr;
 using Clock = std::chrono::steady_clock;
 
 SelfProximity::SelfProximity(ros::NodeHandle private_nh, const ServerConfig& config,
-                             const TransformBuffer& buffer, JointStateListener* joints,
-                             std::function<LiveConfig()> live)
-    : config_(config), buffer_(buffer), joints_(joints), live_(std::move(live)) {
+                             const ModelLoader& loader, const TransformBuffer& buffer,
+                             JointStateListener* joints, std::function<LiveConfig()> live)
+    : config_(config), loader_(loader), buffer_(buffer), joints_(joints), live_(std::move(live)) {
   publisher_ = private_nh.advertise<ProximityArray>("self_proximity", 10);
   thread_ = std::thread(&SelfProximity::run, this);
 }
@@ -34,11 +34,6 @@ SelfProximity::SelfProximity(ros::NodeHandle private_nh, const ServerConfig& con
 SelfProximity::~SelfProximity() {
   stop_signal_.stop();
   thread_.join();
-}
-
-void SelfProximity::set_model(std::shared_ptr<const ModelState> model) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  newest_model_ = with_paired(std::move(model));
 }
 
 ProximityArrayConstPtr SelfProximity::newest() const {
@@ -64,7 +59,7 @@ void SelfProximity::run() {
     if (!stop_signal_.sleep_until(next)) return;
     const std::string fault = exception_of([this] {
       take_model();
-      if (model_) publish_once();
+      publish_once();
     });
     if (!fault.empty()) publish_failure(fault);
   }
@@ -89,13 +84,11 @@ void SelfProximity::publish_failure(const std::string& fault) {
 }
 
 void SelfProximity::take_model() {
-  bool is_refined = false;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (newest_model_ == model_) return;
-    is_refined = query_ && model_ && is_refinement(*model_, *newest_model_);
-    model_ = newest_model_;
-  }
+  const auto newest = loader_.state();
+  if (newest == loaded_) return;
+  const bool is_refined = query_ && is_refinement(*loaded_, *newest);
+  model_ = with_paired(newest);
+  loaded_ = newest;
   if (is_refined) {
     query_ =
         std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query, is_stopped_);
@@ -174,7 +167,7 @@ void SelfProximity::compute_wrenches(const LiveConfig& live, TimePoint end, Dead
     if (volume.known < 1.0) {
       ++cost->no_penetration;
     } else {
-      wrenches_[i] = contact_wrench(volume, X_FA, live.penetration);
+      wrenches_[i] = contact_wrench(volume, X_FA, PenetrationConfig());
     }
   }
 }

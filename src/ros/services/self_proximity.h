@@ -15,7 +15,7 @@
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ros/common/stop_signal.h"
-#include "ros/model/model_state.h"
+#include "ros/model/model_loader.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/pose_source.h"
@@ -30,16 +30,13 @@ namespace ist {
 /// they are in contact at rest. Its links are the monitored ones, and then the paired ones.
 class SelfProximity {
  public:
-  /// @param buffer   outlives this
+  /// @param loader, buffer  outlive this
   /// @param joints   outlives this; null: link poses come from the buffer
   /// @param live     gives the present configuration; called from the thread
-  SelfProximity(ros::NodeHandle private_nh, const ServerConfig& config,
+  SelfProximity(ros::NodeHandle private_nh, const ServerConfig& config, const ModelLoader& loader,
                 const TransformBuffer& buffer, JointStateListener* joints,
                 std::function<LiveConfig()> live);
   ~SelfProximity();
-
-  /// Thread safe.
-  void set_model(std::shared_ptr<const ModelState> model);
 
   /// The message that was published last; null before the first. Thread safe.
   ist_proximity::ProximityArrayConstPtr newest() const;
@@ -59,6 +56,7 @@ class SelfProximity {
   Wrench penetration(std::size_t link, const LinkProximity& answer) const;
 
   const ServerConfig config_;
+  const ModelLoader& loader_;
   const TransformBuffer& buffer_;
   JointStateListener* const joints_;
   const std::function<LiveConfig()> live_;
@@ -66,13 +64,12 @@ class SelfProximity {
 
   StopSignal stop_signal_;
   const std::function<bool()> is_stopped_ = [this] { return stop_signal_.stopped(); };
-  mutable std::mutex mutex_;  // guards the next two members
-  std::shared_ptr<const ModelState> newest_model_;
+  mutable std::mutex mutex_;  // guards the next one
   ist_proximity::ProximityArrayConstPtr newest_;
 
   // Used by the thread alone.
-  std::shared_ptr<const ModelState> model_;
-  std::unique_ptr<SelfQuery> query_;  ///< null without a model or its kinematics
+  std::shared_ptr<const ModelState> loaded_, model_;  ///< the latter with the paired links
+  std::unique_ptr<SelfQuery> query_;                  ///< null without a model or its kinematics
   std::unique_ptr<PoseSource> pose_source_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
   std::vector<LinkBox> boxes_;        ///< likewise

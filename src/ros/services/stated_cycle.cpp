@@ -1,23 +1,10 @@
 #include "ros/services/stated_cycle.h"
 
-#include <utility>
-
 namespace ist {
 
-void StatedCycle::set_model(std::shared_ptr<const ModelState> model) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  newest_model_ = std::move(model);
-}
-
 std::string StatedCycle::take_model() {
-  std::shared_ptr<const ModelState> model;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    model = newest_model_;
-  }
-  if (!model || !model->is_ready()) {
-    return model ? model->problem : "the robot's model is not ready yet";
-  }
+  std::shared_ptr<const ModelState> model = loader_.state();
+  if (!model->is_ready()) return model->problem;
   if (!model->kinematics) return no_kinematics(*model);
   if (model == model_) return "";
   const bool is_refined = cycle_ && model_ && is_refinement(*model_, *model);
@@ -47,10 +34,7 @@ std::string StatedCycle::run(const sensor_msgs::JointState& configuration, const
 
 TimeOfImpact& StatedCycle::impacts(const QueryConfig& query) {
   impacts_->set_config(query);
-  if (cycle_->has_worlds()) {
-    const WorldAnswers& answers = cycle_->world_answers();
-    impacts_->set_surfaces(answers.surfaces(), answers.link_margins(*model_->robot));
-  }
+  if (cycle_->has_worlds()) impacts_->set_surfaces(cycle_->world_answers().surfaces(), {});
   return *impacts_;
 }
 

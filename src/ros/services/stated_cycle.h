@@ -5,14 +5,13 @@
 #include <sensor_msgs/JointState.h>
 
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "ist_proximity/proximity/time_of_impact.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/unknown_space.h"
-#include "ros/model/model_state.h"
+#include "ros/model/model_loader.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/stated_pose_source.h"
 
@@ -20,17 +19,14 @@ namespace ist {
 
 /// Queries of configurations that the robot need not be in, and of motions that begin there,
 /// against the obstacles of now. It has a cycle of its own, so that it never delays the node's. One
-/// thread, but for set_model().
+/// thread.
 class StatedCycle {
  public:
-  /// @param sources, buffer  outlive this
-  /// @param watch            outlives this; null with ~unknown_space free
-  StatedCycle(const ServerConfig& config, const CloudSources& sources,
+  /// @param loader, sources, buffer  outlive this
+  /// @param watch                    outlives this; null with ~unknown_space free
+  StatedCycle(const ServerConfig& config, const ModelLoader& loader, const CloudSources& sources,
               const TransformBuffer& buffer, UnknownSpaceWatch* watch)
-      : config_(config), sources_(sources), buffer_(buffer), watch_(watch) {}
-
-  /// Thread safe.
-  void set_model(std::shared_ptr<const ModelState> model);
+      : config_(config), loader_(loader), sources_(sources), buffer_(buffer), watch_(watch) {}
 
   /// Takes the newest model.
   /// @returns empty, or why there is none
@@ -54,12 +50,10 @@ class StatedCycle {
 
  private:
   const ServerConfig config_;
+  const ModelLoader& loader_;
   const CloudSources& sources_;
   const TransformBuffer& buffer_;
   UnknownSpaceWatch* const watch_;  ///< null with ~unknown_space free
-
-  std::mutex mutex_;
-  std::shared_ptr<const ModelState> newest_model_;
 
   std::shared_ptr<const ModelState> model_;
   StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle

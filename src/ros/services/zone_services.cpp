@@ -35,19 +35,6 @@ ZoneConfig to_zone(const SetZone::Request& request) {
   return zone;
 }
 
-/// The sentence about the first name that is none of the links; empty: all are.
-std::string unknown_link(const std::vector<std::string>& names,
-                         const std::vector<std::string>& links) {
-  const std::set<std::string> known(links.begin(), links.end());
-  for (const std::string& name : names) {
-    if (known.count(name) > 0) continue;
-    const std::string nearest = nearest_name(name, known);
-    return "'" + printable(name) + "' is no monitored link" +
-           (nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
-  }
-  return "";
-}
-
 }  // namespace
 
 ZoneServices::ZoneServices(ros::NodeHandle private_nh, const ServerConfig& config,
@@ -104,7 +91,7 @@ std::string ZoneServices::set_zone(const SetZone::Request& request) {
     const ZoneConfig zone = to_zone(request);
     const std::string fault = zones_fault({zone});
     if (!fault.empty()) return fault;
-    const std::string unknown = unknown_link(zone.links, model->links);
+    const std::string unknown = unmonitored_name(zone.links, *model);
     if (!unknown.empty()) return unknown;
     Eigen::Isometry3d ignored;
     const std::string lost = look_up(buffer_, fixed_frame_of(*model, config_),
@@ -142,7 +129,7 @@ std::vector<std::string> ZoneServices::remarks() const {
   if (summary.empty() || !model->robot) return {};
   std::vector<std::string> texts = zones_.off(fixed_frame_of(*model, config_), now);
   for (const ZoneConfig& zone : config_.zones) {
-    const std::string unknown = unknown_link(zone.links, model->links);
+    const std::string unknown = unmonitored_name(zone.links, *model);
     if (!unknown.empty()) texts.push_back("~zones/" + zone.name + "/links: " + unknown);
   }
   const std::string without = without_effect();

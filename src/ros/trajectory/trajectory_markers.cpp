@@ -6,7 +6,6 @@
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/text.h"
 #include "ros/output/markers.h"
-#include "ros/output/nearest_summary.h"
 
 namespace ist {
 namespace {

@@ -41,15 +41,16 @@ ServerConfig with_fixed_links(ServerConfig config) {
 }  // namespace
 
 TrajectoryWatch::TrajectoryWatch(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
-                                 const ServerConfig& config, const CloudSources& sources,
-                                 const TransformBuffer& buffer, UnknownSpaceWatch* watch,
-                                 const IgnoreService& ignored, std::function<LiveConfig()> live)
+                                 const ServerConfig& config, const ModelLoader& loader,
+                                 const CloudSources& sources, const TransformBuffer& buffer,
+                                 UnknownSpaceWatch* watch, const IgnoreService& ignored,
+                                 std::function<LiveConfig()> live)
     : nh_(nh),
       private_nh_(private_nh),
       config_(with_fixed_links(config)),
       ignored_(ignored),
       live_(std::move(live)),
-      stated_(config, sources, buffer, watch) {
+      stated_(config, loader, sources, buffer, watch) {
   publisher_ = private_nh_.advertise<Message>("trajectory_clearance", 10);
   markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("trajectory_markers", 1);
   if (!config.trajectory.cancel_topic.empty()) {

@@ -29,24 +29,21 @@ namespace ist {
 /// UNKNOWN until another one comes: what is running then is not known. So is a robot that is not
 /// where the trajectory has it. Links that the trajectory does not move do not count while it moves
 /// no known object, nor those that ~ignore_links leaves out of ~min_distance. While somebody
-/// listens to ~trajectory_markers, the robot is drawn where it touches. All but set_model() is
-/// called by the thread of one callback queue.
+/// listens to ~trajectory_markers, the robot is drawn where it touches. It is called by the thread
+/// of one callback queue.
 class TrajectoryWatch {
  public:
-  /// @param sources, buffer  outlive this
+  /// @param loader, sources, buffer, ignored  outlive this
   /// @param watch            outlives this; null with ~unknown_space free
-  /// @param ignored          outlives this
   /// @param live             gives the present configuration
   TrajectoryWatch(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
-                  const ServerConfig& config, const CloudSources& sources,
-                  const TransformBuffer& buffer, UnknownSpaceWatch* watch,
-                  const IgnoreService& ignored, std::function<LiveConfig()> live);
+                  const ServerConfig& config, const ModelLoader& loader,
+                  const CloudSources& sources, const TransformBuffer& buffer,
+                  UnknownSpaceWatch* watch, const IgnoreService& ignored,
+                  std::function<LiveConfig()> live);
 
   /// Begins to receive messages by a queue, which outlives this; its thread ends first.
   void subscribe(ros::CallbackQueue* queue);
-
-  /// Thread safe.
-  void set_model(std::shared_ptr<const ModelState> model) { stated_.set_model(std::move(model)); }
 
   /// Goes on where something is due; to be called every 10 ms or more often.
   void run_when_due();
