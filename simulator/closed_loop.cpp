@@ -10,7 +10,10 @@
 namespace ist::sim {
 namespace {
 
-constexpr double kTruthRange = 10.0;  // [m]
+constexpr double kTruthRange = 10.0;   // [m]
+constexpr double kOwnRange = 0.02;     // [m] in which links are measured from each other
+constexpr double kReach = 1.0;         // [m] more than any link's distance from a joint's axis
+constexpr double kTouchRange = 0.001;  // [m] in which touches are looked for after the first one
 
 /// A reading without obstacles, for an arm that is blind or undisturbed.
 example::Reading nothing_near() {
@@ -116,18 +119,42 @@ example::Reading Perception::reading(const Simulation& world, const example::Con
   return reading;
 }
 
+OwnDistances::OwnDistances(const RobotDescription& robot,
+                           const std::shared_ptr<const RobotModel>& model,
+                           const QueryConfig& config)
+    : query_(model,
+             self_collision_pairs(*model, Kinematics(robot),
+                                  std::vector<bool>(model->links.size(), true), {}),
+             config) {}
+
+const std::vector<PairProximity>& OwnDistances::run(const std::vector<Eigen::Isometry3d>& X_FL) {
+  query_.run(X_FL, std::vector<bool>(X_FL.size(), true), &answers_);
+  return answers_;
+}
+
+double OwnDistances::least(const std::vector<Eigen::Isometry3d>& X_FL) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const PairProximity& pair : run(X_FL)) least = std::min(least, pair.distance);
+  return least;
+}
+
 FilteredCommand::FilteredCommand(const RobotDescription& robot,
-                                 std::shared_ptr<const RobotModel> model, const ArmConfig& arm)
+                                 std::shared_ptr<const RobotModel> model, const ArmConfig& arm,
+                                 const ClosedLoopConfig& config)
     : model_(std::move(model)),
       kinematics_(std::make_shared<const Kinematics>(robot)),
-      rows_(*model_, kinematics_),
+      config_(config),
+      own_(robot, model_, config.query),
+      builder_(*model_, kinematics_, own_.pairs()),
       filter_(joint_limits(*kinematics_, arm.max_velocity)),
-      speeds_(model_->links.size()) {}
+      speeds_(model_->links.size()) {
+  // Obstacles within the padding are not seen.
+  config_.rows.margin += config.ingest.self_filter_padding;
+  config_.rows.stop_distance += config.ingest.self_filter_padding;
+}
 
-Eigen::VectorXd FilteredCommand::run(const Simulation& world, RowConfig config,
-                                     Perception* perception, const Eigen::VectorXd& command) {
-  Eigen::VectorXd given = Eigen::VectorXd::Zero(command.size());
-  if (!perception->has_seen()) return given;
+void FilteredCommand::place_rows(const Simulation& world, Perception* perception,
+                                 const std::vector<double>& q) {
   const std::vector<LinkProximity>& answers = perception->answer(world);
   const std::vector<Eigen::Isometry3d> X_FL = world.link_poses();
   std::vector<double> obstacle_speeds(answers.size());
@@ -140,26 +167,66 @@ Eigen::VectorXd FilteredCommand::run(const Simulation& world, RowConfig config,
         speeds_[i].update(world.time(), answers[i], X_FL[i], {source, generation, stamp});
     obstacle_speeds[i] = std::max(0.0, rates.obstacles);  // of NaN: 0
   }
+  RowConfig config = config_.rows;
   for (const CloudSnapshot& cloud : perception->snapshots()) {
     config.age = std::max(config.age, world.time() - cloud.stamp);
   }
-  const std::vector<double> all = world.arm().all_positions(world.arm().positions());
   JointPoses joint_poses;
   BodyPoses bodies;
-  kinematics_->place_joints(all, &joint_poses);
+  kinematics_->place_joints(q, &joint_poses);
   kinematics_->place_bodies(joint_poses, Eigen::Isometry3d::Identity(), &bodies);
-  rows_.begin(bodies, config);
-  rows_.add_links(answers, obstacle_speeds);
+  builder_.begin(bodies, config);
+  builder_.add_links(answers, obstacle_speeds);
+  config.margin = 0.0;
+  config.stop_distance = config_.self_stop_distance;
+  builder_.set_config(config);
+  builder_.add_pairs(own_.run(X_FL));
+  rows_ = builder_.rows();
+}
 
-  const std::vector<std::size_t>& columns = rows_.joints();
+// Joints that are not commanded stand.
+void FilteredCommand::hold_others(const std::vector<std::size_t>& commanded) {
+  const std::vector<std::size_t>& columns = builder_.joints();
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    if (std::find(commanded.begin(), commanded.end(), columns[c]) != commanded.end()) continue;
+    rows_.G.col(static_cast<Eigen::Index>(c)).setZero();
+    rows_.sweep.col(static_cast<Eigen::Index>(c)).setZero();
+  }
+}
+
+// The gradient of the smallest distance from an obstacle; false beyond the stop distance, and where
+// joints do not change it.
+bool FilteredCommand::way_out(std::vector<double>* wanted) const {
+  double least = config_.rows.stop_distance, fastest = 0.0;
+  Eigen::VectorXd away;
+  for (std::size_t i = 0; i < rows_.count; ++i) {
+    if (rows_.origins[i].is_pair || !(rows_.origins[i].bound < least)) continue;
+    least = rows_.origins[i].bound;
+    away = -rows_.G.row(static_cast<Eigen::Index>(i)).transpose();
+    fastest = away.cwiseAbs().maxCoeff();
+  }
+  if (!(fastest > 0.0)) return false;
+  Eigen::Map<Eigen::VectorXd>(wanted->data(), away.size()) = config_.leave_speed / fastest * away;
+  return true;
+}
+
+Eigen::VectorXd FilteredCommand::run(const Simulation& world, Perception* perception,
+                                     const Eigen::VectorXd& command) {
+  Eigen::VectorXd given = Eigen::VectorXd::Zero(command.size());
+  if (!perception->has_seen()) return given;
+  const std::vector<double> all = world.arm().all_positions(world.arm().positions());
+  const std::vector<std::size_t>& columns = builder_.joints();
   const std::vector<std::size_t>& commanded = world.arm().joints();
+  place_rows(world, perception, all);
+  hold_others(commanded);
   std::vector<double> wanted(columns.size(), 0.0), q;
+  const bool leaves = config_.leave_speed > 0.0 && way_out(&wanted);
   for (std::size_t c = 0; c < columns.size(); ++c) {
     q.push_back(all[columns[c]]);
     const auto at = std::find(commanded.begin(), commanded.end(), columns[c]);
-    if (at != commanded.end()) wanted[c] = command[at - commanded.begin()];
+    if (at != commanded.end() && !leaves) wanted[c] = command[at - commanded.begin()];
   }
-  const FilterAnswer& answer = filter_.run(wanted, q, rows_.rows());
+  const FilterAnswer& answer = filter_.run(wanted, q, rows_);
   for (std::size_t j = 0; j < commanded.size(); ++j) {
     const auto at = std::find(columns.begin(), columns.end(), commanded[j]);
     given[static_cast<Eigen::Index>(j)] =
@@ -180,21 +247,70 @@ double driven_speed(const Simulation& world, const Eigen::VectorXd& q_before) {
          Simulation::kStep;
 }
 
-/// Keeps the smallest true distance so far, and where it was.
-/// @param q_before  [rad] by commanded joint, before the last step
-void note_distance(const Simulation& world, const Eigen::VectorXd& q_before,
-                   const RobotDescription& robot, const Scene& scene, ClosedLoopResult* result) {
-  const Simulation::Truth truth = world.nearest(std::min(result->smallest_distance, kTruthRange));
-  if (!(truth.distance < result->smallest_distance)) return;
-  if (truth.distance <= 0.0 && result->smallest_distance > 0.0) {
-    result->speed_at_touch = world.arm().velocities().cwiseAbs().maxCoeff();
-    result->driven_at_touch = driven_speed(world, q_before);
+/// Keeps the smallest true distances of a run, where they were, and how touches came about.
+class Truth {
+ public:
+  Truth(const RobotDescription& robot, const std::shared_ptr<const RobotModel>& model,
+        const Scene& scene)
+      : robot_(robot), scene_(scene), own_(robot, model, exact()) {
+    result.smallest_distance = result.own_distance = std::numeric_limits<double>::infinity();
+    result.task_time = std::numeric_limits<double>::infinity();
   }
-  result->smallest_distance = truth.distance;
-  result->when = world.time();
-  result->link = robot.links[truth.link].name;
-  result->obstacle = scene.obstacles[truth.obstacle].name;
-}
+
+  /// @param q_before  [rad] by commanded joint, before the last step
+  void note(const Simulation& world, const Eigen::VectorXd& q_before) {
+    note_obstacles(world, q_before);
+    left_ -= kReach * (world.arm().positions() - q_before).lpNorm<1>();
+    if (left_ <= 0.0) note_own(world);
+  }
+
+  ClosedLoopResult result;
+
+ private:
+  static QueryConfig exact() {
+    QueryConfig config;
+    config.tolerance = 0.0;
+    config.max_distance = kOwnRange;
+    return config;
+  }
+
+  void note_own(const Simulation& world) {
+    const double own = std::min(own_.least(world.link_poses()), kOwnRange);
+    if (own <= 0.0 && last_own_ > 0.0) touch((last_own_ - own) / (world.time() - own_time_));
+    last_own_ = own;
+    own_time_ = world.time();
+    left_ = own > 0.0 ? own : kOwnRange;
+    result.own_distance = std::min(result.own_distance, own);
+  }
+
+  void touch(double speed) {
+    result.driven_at_touch = has_touched_ ? std::max(result.driven_at_touch, speed) : speed;
+    has_touched_ = true;
+  }
+
+  void note_obstacles(const Simulation& world, const Eigen::VectorXd& q_before) {
+    const double limit = std::clamp(result.smallest_distance, kTouchRange, kTruthRange);
+    const Simulation::Truth truth = world.nearest(limit);
+    const bool touches = truth.distance <= 0.0;
+    if (touches && !has_contact_) {
+      if (!has_touched_) result.speed_at_touch = world.arm().velocities().cwiseAbs().maxCoeff();
+      touch(driven_speed(world, q_before));
+    }
+    has_contact_ = touches;
+    if (!(truth.distance < result.smallest_distance)) return;
+    result.smallest_distance = truth.distance;
+    result.when = world.time();
+    result.link = robot_.links[truth.link].name;
+    result.obstacle = scene_.obstacles[truth.obstacle].name;
+  }
+
+  const RobotDescription& robot_;
+  const Scene& scene_;
+  OwnDistances own_;
+  double last_own_ = kOwnRange, own_time_ = 0.0;  // [m], and when that was measured [s]
+  double left_ = 0.0;  // [m] that links may move until they can touch, or have parted
+  bool has_contact_ = false, has_touched_ = false;
+};
 
 }  // namespace
 
@@ -208,10 +324,9 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
   const example::ControlledArm arm(robot, world.arm().config().joints);
   Perception perception(model, config, world.cameras().size());
 
-  ClosedLoopResult result;
-  result.smallest_distance = std::numeric_limits<double>::infinity();
-  result.task_time = std::numeric_limits<double>::infinity();
-  FilteredCommand filter(robot, model, world.arm().config());
+  Truth truth(robot, model, scene);
+  ClosedLoopResult& result = truth.result;
+  FilteredCommand filter(robot, model, world.arm().config(), config);
   std::size_t goal = 1 % scene.goals.size();
   Eigen::VectorXd command = Eigen::VectorXd::Zero(scene.goals[0].size());
   for (int step = 0; world.time() < scene.duration ||
@@ -228,11 +343,11 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
       const example::Reading reading =
           is_blind || is_filtered ? nothing_near() : perception.reading(world, arm);
       command = example::dodge(arm, q, scene.goals[goal], reading, config.controller);
-      if (is_filtered) command = filter.run(world, config.rows, &perception, command);
+      if (is_filtered) command = filter.run(world, &perception, command);
     }
     const Eigen::VectorXd q_before = world.arm().positions();
     world.step(command);
-    note_distance(world, q_before, robot, scene, &result);
+    truth.note(world, q_before);
   }
   result.last_distance = world.nearest(kTruthRange).distance;
   return result;

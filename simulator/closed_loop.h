@@ -14,6 +14,7 @@
 #include "ist_proximity/control/velocity_filter.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_model.h"
@@ -39,14 +40,16 @@ struct ClosedLoopConfig {
   QueryConfig query;
   RepulsionConfig repulsion;
   SpeedScaleConfig speed_scale;
-  RowConfig rows;
+  RowConfig rows;                    ///< the self-filter's padding is added to its distances
+  double self_stop_distance = 0.01;  ///< [m] of links from each other, with a margin of 0
+  /// [rad/s] of the fastest joint. More than 0: within the stop distance the filter is asked for
+  /// the way out from what is nearest, in place of the task.
+  double leave_speed = 0.0;
   bool remember = false;  ///< what a camera no longer sees stays, as the node's ~memory
   MemoryConfig memory;
   ClosedLoopConfig() {
-    speed_scale.free_distance = 0.25;   // as in config/dodge.yaml
-    ingest.self_filter_padding = 0.03;  // six times the cameras' noise
-    // Within the padding nothing is seen, and drives need some way, too.
-    rows.stop_distance = 0.1;
+    speed_scale.free_distance = 0.25;    // as in config/dodge.yaml
+    ingest.self_filter_padding = 0.03;   // six times the cameras' noise
     repulsion.influence_distance = 0.5;  // more than any distance the controller reacts to
   }
 };
@@ -87,23 +90,46 @@ class Perception {
   std::vector<Eigen::Isometry3d> X_FL_;
 };
 
+/// Distances of an arm's links from each other, adjacent ones left out.
+class OwnDistances {
+ public:
+  OwnDistances(const RobotDescription& robot, const std::shared_ptr<const RobotModel>& model,
+               const QueryConfig& config);
+
+  /// @param X_FL  by link of the model
+  const std::vector<PairProximity>& run(const std::vector<Eigen::Isometry3d>& X_FL);
+  const std::vector<LinkPair>& pairs() const { return query_.pairs(); }
+  /// [m] The least distance of two links; 0 or less in contact.
+  double least(const std::vector<Eigen::Isometry3d>& X_FL);
+
+ private:
+  SelfQuery query_;
+  std::vector<PairProximity> answers_;
+};
+
 /// Passes velocities through a VelocityFilter, its rows those of a Perception, with the speeds of
-/// obstacles that the node would tell.
+/// obstacles that the node would tell, and those of links against each other.
 class FilteredCommand {
  public:
   FilteredCommand(const RobotDescription& robot, std::shared_ptr<const RobotModel> model,
-                  const ArmConfig& arm);
+                  const ArmConfig& arm, const ClosedLoopConfig& config);
 
   /// @param command  [rad/s] by commanded joint
-  /// @param config   its age is set
   /// @returns 0 until every camera has delivered an image
-  Eigen::VectorXd run(const Simulation& world, RowConfig config, Perception* perception,
+  Eigen::VectorXd run(const Simulation& world, Perception* perception,
                       const Eigen::VectorXd& command);
 
  private:
+  void place_rows(const Simulation& world, Perception* perception, const std::vector<double>& q);
+  void hold_others(const std::vector<std::size_t>& commanded);
+  bool way_out(std::vector<double>* wanted) const;
+
   std::shared_ptr<const RobotModel> model_;
   std::shared_ptr<const Kinematics> kinematics_;
-  ConstraintRowBuilder rows_;
+  ClosedLoopConfig config_;
+  OwnDistances own_;
+  ConstraintRowBuilder builder_;
+  ConstraintRows rows_;
   VelocityFilter filter_;
   std::vector<ClosingSpeed> speeds_;
 };
@@ -111,6 +137,7 @@ class FilteredCommand {
 /// Measurements of one run of a scene.
 struct ClosedLoopResult {
   double smallest_distance = 0.0;  ///< [m] true distance of any moved link to any obstacle
+  double own_distance = 0.0;       ///< [m] the smallest true one of two links, 20 mm at most
   double when = 0.0;               ///< [s] of the smallest distance
   double last_distance = 0.0;      ///< [m] the same at the end; inf far from all
   std::string link, obstacle;      ///< of the smallest distance
@@ -118,8 +145,8 @@ struct ClosedLoopResult {
   double task_time = 0.0;          ///< [s] when the task was done; inf: it was not
   /// [rad/s] of the fastest joint at the first touch; 0 without any.
   double speed_at_touch = 0.0;
-  /// [m/s] at which the arm, by its own motion alone, came nearer to what it touched first; 0
-  /// without any touch.
+  /// [m/s] at which the arm, by its own motion alone, came nearer to what it touched: the most of
+  /// all touches, of obstacles and of links; 0 or less where nothing was driven into.
   double driven_at_touch = 0.0;
 };
 

@@ -30,6 +30,21 @@ Eigen::VectorXd random_goal(Rng* rng) {
   return q;
 }
 
+// Goals beside the bench: the arm is folded below its base, and its wrist swings the gripper from
+// one side of the stand to the other.
+bool choose_folded_goals(const SceneRules& rules, Rng* rng, Eigen::VectorXd* a,
+                         Eigen::VectorXd* b) {
+  constexpr double kApart = 0.02;  // [m]
+  const double wrist = uniform(rng, 0.6, 1.3);
+  *a = Eigen::VectorXd(6);
+  *a << uniform(rng, 1.5, 2.7), uniform(rng, 1.6, 1.9), uniform(rng, 1.9, 2.2),
+      0.5 * M_PI + uniform(rng, -0.3, 0.3), wrist, uniform(rng, -1.5, 1.5);
+  *b = *a;
+  (*b)[4] = -wrist;
+  return rules.own_distance(0.5 * (*a + *b)) <= 0.0 && rules.own_distance(*a) > kApart &&
+         rules.own_distance(*b) > kApart;
+}
+
 bool way_is_clear(Simulation* world, const Eigen::VectorXd& a, const Eigen::VectorXd& b,
                   double clearance) {
   for (int k = 0; k <= 20; ++k) {
@@ -41,8 +56,15 @@ bool way_is_clear(Simulation* world, const Eigen::VectorXd& a, const Eigen::Vect
 
 void choose_goals(Simulation* world, const SceneRules& rules, Rng* rng, Scene* scene) {
   for (int k = 0; k < kTries; ++k) {
-    const Eigen::VectorXd a = random_goal(rng), b = random_goal(rng);
-    if (std::abs(a[0] - b[0]) < 0.8 || !way_is_clear(world, a, b, rules.goal_clearance)) continue;
+    Eigen::VectorXd a, b;
+    if (rules.own_distance) {
+      if (!choose_folded_goals(rules, rng, &a, &b)) continue;
+    } else {
+      a = random_goal(rng);
+      b = random_goal(rng);
+      if (std::abs(a[0] - b[0]) < 0.8) continue;
+    }
+    if (!way_is_clear(world, a, b, rules.goal_clearance)) continue;
     scene->goals = {a, b};
     return;
   }

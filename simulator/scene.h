@@ -41,6 +41,9 @@ struct SceneRules {
   int people = 0;                   ///< columns that walk past, one at a time, as bodies do
   double walking_speed = 1.6;       ///< [m/s]
   double near_walk = 0.55, far_walk = 0.80;  ///< [m] from the shoulder's axis to their middle
+  /// [m] from link to link, at joint positions. Where it is set, the goals are on either side of a
+  /// position at which the arm, folded below its base, touches itself.
+  std::function<double(const Eigen::VectorXd&)> own_distance;
 };
 
 /// A random scene: the demo arm moves between two goals above its bench, two cameras look from

@@ -87,6 +87,36 @@ TEST(ClosedLoop, TheFilterDrivesIntoNothing) {
   EXPECT_GT(collisions, 0);
 }
 
+// The arm, folded below its base, swings its gripper through its stand.
+TEST(ClosedLoop, TheFilterKeepsLinksApart) {
+  const RobotDescription robot = test::demo_robot();
+  ClosedLoopConfig config;
+  config.control_period = 10;
+  const Arm arm(robot, demo_arm());
+  OwnDistances own(robot, test::demo_model(), config.query);
+  SceneRules rules;
+  rules.obstacles = 0;
+  rules.goal_clearance = 0.12;
+  rules.own_distance = [&](const Eigen::VectorXd& q) { return own.least(arm.link_poses(q)); };
+  const auto nominal = [&](const Scene& scene) {
+    return nominal_motion(robot, scene, config.controller);
+  };
+  const std::uint64_t scenes = test::kSanitized ? 1 : 3;
+  for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
+    Scene scene = make_scene(robot, seed, rules, nominal);
+    scene.duration = 0.0;
+    scene.patience = 4.0;
+    config.avoidance = Avoidance::kNone;
+    const ClosedLoopResult blind = run_closed_loop(robot, test::demo_model(), scene, seed, config);
+    EXPECT_LE(blind.own_distance, 0.0) << "seed " << seed;
+    EXPECT_GT(blind.driven_at_touch, 0.05) << "seed " << seed;
+    config.avoidance = Avoidance::kFilter;
+    const ClosedLoopResult seeing = run_closed_loop(robot, test::demo_model(), scene, seed, config);
+    EXPECT_GT(seeing.own_distance, 0.0) << "seed " << seed;
+    EXPECT_LT(seeing.own_distance, 0.02) << "seed " << seed << ": it did not come near";
+  }
+}
+
 // A minute of moving in view of a camera with 5 mm of noise and 50 ms of latency.
 TEST(SelfView, NoFalseContactInAMinute) {
   SelfViewConfig config;
