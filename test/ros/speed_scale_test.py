@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """~speed_scale and ~min_distance: which links count in them, and what they say."""
 
-import subprocess
 import sys
 import time
 import unittest
@@ -11,7 +10,7 @@ import proximity_testing as pt
 import rospy
 from ist_proximity.msg import SpeedScaleState
 from proximity_testing import LinkProximity, ProximityArray
-from std_msgs.msg import Float64, Float64MultiArray
+from std_msgs.msg import Float64
 
 # A bench arm: stand and base are bolted to the bench, which is 2.5 cm away for ever; `arm` turns.
 BENCH_ARM = """<robot name="bench_arm">
@@ -105,44 +104,6 @@ class SpeedScaleTest(unittest.TestCase):
         self.wait_for_minimum(node, 0.025)
         self.assertEqual((self.scales[-1].link, self.scales[-1].scale), ("stand", 0.0))
         self.assertEqual(self.scales[-1].rule, SpeedScaleState.STOP)
-
-    def test_examples_that_slow_down(self):
-        """examples/slow_down: the scale times the velocities, 0 without either of both."""
-        self.start_bench()
-        node = self.start(BENCH_ARM)
-        wanted = rospy.Publisher(self.namespace + "/wanted", Float64MultiArray, queue_size=1)
-        task = pt.Repeater(50, lambda: wanted.publish(data=[1.0, -2.0]))
-        programs, allowed, subscribers = [], {}, []
-        for name in ("slow_down", "slow_down.py"):
-            topic = "%s/allowed_%s" % (self.namespace, name[-2:])
-            program = pt.find_program("ist_proximity", name)
-            arguments = ["__ns:=" + self.namespace, "__name:=" + topic[-2:], "allowed:=" + topic]
-            programs.append(subprocess.Popen([program, *arguments]))
-            take = lambda m, name=name: allowed.update({name: m.data})  # noqa: E731
-            subscribers.append(rospy.Subscriber(topic, Float64MultiArray, take))
-
-        def wait_for(scale):
-            expected = np.array([1.0, -2.0]) * scale
-            same = lambda m: len(m) == 2 and abs(m - expected).max() < 0.02  # noqa: E731
-            node.wait_until(
-                lambda: len(allowed) == 2 and all(same(np.array(m)) for m in allowed.values()),
-                "a share of %s of the velocities" % scale,
-            )
-
-        try:
-            wait_for(0.75)  # the tool is 0.25 m away, between 0.1 m and 0.3 m
-            task.paused = True
-            wait_for(0.0)
-            task.paused = False
-            wait_for(0.75)
-            self.nodes.remove(node)
-            self.assertEqual(node.stop(), 0)
-            wait_for(0.0)
-        finally:
-            task.stop()
-            for program in programs:
-                program.terminate()
-                program.wait()
 
     def test_fixed_frame_outside_the_urdf(self):
         """What cannot be known counts: base may drive in odom, and a static transform says it does not."""
