@@ -109,7 +109,7 @@ TEST(ClosedLoop, TheFilterKeepsLinksApart) {
     config.avoidance = Avoidance::kNone;
     const ClosedLoopResult blind = run_closed_loop(robot, test::demo_model(), scene, seed, config);
     EXPECT_LE(blind.own_distance, 0.0) << "seed " << seed;
-    EXPECT_GT(blind.driven_at_touch, 0.05) << "seed " << seed;
+    EXPECT_GT(blind.driven_at_touch, 0.005) << "seed " << seed;
     config.avoidance = Avoidance::kFilter;
     const ClosedLoopResult seeing = run_closed_loop(robot, test::demo_model(), scene, seed, config);
     EXPECT_GT(seeing.own_distance, 0.0) << "seed " << seed;

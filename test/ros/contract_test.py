@@ -30,7 +30,7 @@ FIELDS = {
         ist_proximity/SourceStatus[] sources; float64 computation_time;
         ist_proximity/LinkProximity[] links""",
     SourceStatus: """string name; uint8 status; time stamp; float64 age; uint32 points_received;
-        uint32 points_used; float32 measured_share; uint32 points_on_robot""",
+        uint32 points_used; float32 measured_share; uint32 points_on_robot; float64 blind_skin""",
     SpeedScaleState: """std_msgs/Header header; float64 scale; string link; string source;
         float64 bound; uint8 rule; string text; float64 stop_distance; float64 free_distance""",
 }

@@ -50,6 +50,7 @@ REDUNDANT = SLIDES.replace(
 WALL = 1.0  # [m] along x
 RADIUS = 0.1
 STOP = 0.05
+PADDING = 0.15  # [m] of the self-filter, where there is one
 JOINTS = ["along", "across"]
 PERIOD = 0.01
 
@@ -114,6 +115,7 @@ class VelocityFilterTest(unittest.TestCase):
         self.nearest = np.inf
         self.robot = self.world.repeat(1.0 / PERIOD, self.move)
         has_post = "post" in self._testMethodName
+        has_padding = "padding" in self._testMethodName
         robot = REDUNDANT if "redundant" in self._testMethodName else SLIDES
         if "base" in self._testMethodName:
             robot = robot.replace("</robot>", BASE)
@@ -121,7 +123,8 @@ class VelocityFilterTest(unittest.TestCase):
             self.namespace,
             {
                 "pose_source": "joint_states",
-                "self_filter": False,
+                "self_filter": has_padding,
+                "self_filter_padding": PADDING,
                 "self_collision/enabled": has_post,
             },
             robot.replace("</robot>", POST) if has_post else robot,
@@ -248,6 +251,14 @@ class VelocityFilterTest(unittest.TestCase):
         # Positions follow the given velocity.
         given = self.filter.given[-1].points[0]
         self.assertLess(abs(given.positions[1] - self.q[1]), 0.2)
+
+    def test_stops_before_the_padding_hides_the_wall(self):
+        """Points within the padding are taken for the robot: nothing would be near there."""
+        self.start(0.5, 0.0)
+        self.wait_for(FilterState.LIMITED)
+        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
+        self.assertGreaterEqual(self.nearest, STOP + PADDING - 0.005)
+        self.assertEqual([s.blind_skin for s in self.node.wait_for_status(ProximityArray.OK).sources], [PADDING])
 
     def test_stops_before_a_post_of_its_own(self):
         self.start(0.0, 0.4, self_proximity=True)

@@ -28,6 +28,15 @@ LinkState state_of(std::uint8_t state) {
 }
 double bound_of(double lower_bound) { return std::isnan(lower_bound) ? -kInfinity : lower_bound; }
 
+// [m] The largest of all sources.
+double blind_skin(const ist_proximity::ProximityArray& message) {
+  double largest = 0.0;
+  for (const ist_proximity::SourceStatus& source : message.sources) {
+    largest = std::max(largest, source.blind_skin);  // of NaN: the first
+  }
+  return largest;
+}
+
 std::size_t place_of(const std::string& link, const std::vector<LinkBox>& boxes) {
   const auto is_it = [&link](const LinkBox& box) { return box.link == link; };
   return static_cast<std::size_t>(std::find_if(boxes.begin(), boxes.end(), is_it) - boxes.begin());
@@ -142,6 +151,10 @@ void ProximityRows::move(std::size_t link, Eigen::Vector3d* p_R) const {
 const ConstraintRows& ProximityRows::rows(const PlacedAnswers& obstacles, const PlacedAnswers& self,
                                           const std::vector<double>& q_now, const RowConfig& config,
                                           double self_stop_distance) {
+  RowConfig of_obstacles = config;
+  const double skin = blind_skin(*obstacles.message);
+  of_obstacles.margin += skin;
+  of_obstacles.stop_distance += skin;
   read(obstacles, self);
   place(q_now, &now_);
   const ConstraintRows& rows = builder_->rows();
@@ -149,7 +162,7 @@ const ConstraintRows& ProximityRows::rows(const PlacedAnswers& obstacles, const 
     return static_cast<std::size_t>(rows.origins[row].index);
   };
   place(obstacles.q, &then_);
-  builder_->begin(then_, config);
+  builder_->begin(then_, of_obstacles);
   add_links();
   for (std::size_t row = 0; row < rows.count; ++row) {
     results_[index(row)].lower_bound -= motion(row, obstacles.q, q_now);
@@ -167,7 +180,7 @@ const ConstraintRows& ProximityRows::rows(const PlacedAnswers& obstacles, const 
       move(builder_->pairs()[i].second, &pair_results_[i].p_FCb);
     }
   }
-  builder_->begin(now_, config);
+  builder_->begin(now_, of_obstacles);
   add_links();
   RowConfig of_pairs = config;
   of_pairs.margin = 0.0;

@@ -29,7 +29,8 @@ struct RowAnswer {
 };
 
 /// Makes ConstraintRows of the node's answers, for where the robot is by now. Obstacles are none
-/// for links that the node's ~ignore_links leaves out. Not thread safe.
+/// for links that the node's ~ignore_links leaves out. The blind skin about the robot adds to
+/// margin and stop distance of obstacles. Not thread safe.
 ///
 /// The robot's motion since the answers' stamp comes off their bounds: with joints moved by
 /// dq, points of a link have moved by at most M = S / (1 - s), S = sum sweep_k |dq_k| and

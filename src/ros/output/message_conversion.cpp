@@ -113,6 +113,12 @@ void assign_source(const SourceReport& source, const Status& status, const ros::
   message->measured_share =
       has ? static_cast<float>(counts.measured_share()) : std::numeric_limits<float>::quiet_NaN();
   message->points_on_robot = counts.on_robot;
+  message->blind_skin = source.blind_skin;
+  if (!has || !source.view.is_used) return;
+  message->blind_skin = 0.0;
+  for (const LinkView& link : source.view.links) {
+    message->blind_skin = std::max(message->blind_skin, link.blind_skin);
+  }
 }
 
 bool is_incomplete(const ProximityArray& message) {
