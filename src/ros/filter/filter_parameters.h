@@ -18,8 +18,8 @@ struct FilterConfig {
   /// Joints of a Float64MultiArray, in order, or those that realise a twist; empty: all that have a
   /// position of their own.
   std::vector<std::string> joints;
-  std::string tool;  ///< link that a twist moves; empty: the frame of one with a stamp
-  bool self_proximity = false;       ///< the node's ~self_proximity bounds velocities, too
+  std::string tool;             ///< link that a twist moves; empty: the frame of one with a stamp
+  bool self_proximity = false;  ///< the node's ~self_proximity bounds velocities, too
   double self_stop_distance = 0.01;  ///< [m] nearer than this, no links approach each other
   double command_timeout = 0.1;      ///< [s]
   double proximity_timeout = 0.2;    ///< [s] oldest answer that still counts
