@@ -53,7 +53,7 @@ JointCommand read_command(const std_msgs::Float64MultiArray& message, const Comm
 /// fault.
 JointCommand read_command(const geometry_msgs::TwistStamped& message, const CommandReader& reader);
 
-/// That of the tool in its own axes, as a mobile base takes it: it keeps its way.
+/// The twist is that of the tool in its own axes, as a mobile base takes it; it keeps its way.
 JointCommand read_command(const geometry_msgs::Twist& message, const CommandReader& reader);
 
 /// The least velocities [rad/s, m/s] that make a twist.

@@ -22,7 +22,7 @@ struct KnownSpace {
   std::string frame;   ///< the fixed frame's name
 };
 
-/// What one source remembers (~memory) in the fixed frame: its clouds go into a MemoryMap in the
+/// The memory of one source (~memory) in the fixed frame: its clouds go into a MemoryMap in the
 /// source's thread, before they are handed to queries, so that a cloud and what is hidden from it
 /// always belong together.
 ///
