@@ -2,6 +2,7 @@
 """moveit_msgs/PlanningScene as a known world: of Noetic and of Melodic, as genpy writes them."""
 
 import atexit
+import itertools
 import math
 import struct
 import subprocess
@@ -28,13 +29,19 @@ def pose(x=0.0, y=0.0, z=0.0):
 
 
 class Bridge:
-    """Runs planning_scene_bridge in a namespace, as a process of the test."""
+    """Runs planning_scene_bridge in a namespace, as a process of the test.
+
+    Each has a name of its own: the master shuts down whoever listens where a killed node of the same
+    name did, be it a node of another test.
+    """
+
+    numbers = itertools.count()
 
     def __init__(self, namespace, scenes, objects, *arguments):
         command = [
             pt.find_program("ist_proximity", "planning_scene_bridge"),
             "__ns:=" + namespace,
-            "__name:=bridge_of_" + objects,
+            "__name:=bridge_%d_of_%s" % (next(self.numbers), objects),
             "planning_scene:=" + scenes,
             "world_objects:=" + objects,
             "/tf:=" + namespace + "/tf",
