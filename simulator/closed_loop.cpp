@@ -10,9 +10,10 @@
 namespace ist::sim {
 namespace {
 
-constexpr double kTruthRange = 10.0;   // [m]
-constexpr double kOwnRange = 0.02;     // [m] in which links are measured from each other
-constexpr double kReach = 1.0;         // [m] more than any link's distance from a joint's axis
+constexpr double kTruthRange = 10.0;  // [m]
+constexpr double kOwnRange = 0.02;    // [m] in which links are measured from each other
+constexpr double kReach = 1.0;        // [m] more than any link's distance from a joint's axis
+constexpr double kCanLeave = 0.1;  // of a link's motion, what at least leads away from an obstacle
 constexpr double kTouchRange = 0.001;  // [m] in which touches are looked for after the first one
 
 /// A reading without obstacles, for an arm that is blind or undisturbed.
@@ -148,9 +149,7 @@ FilteredCommand::FilteredCommand(const RobotDescription& robot,
       builder_(*model_, kinematics_, own_.pairs()),
       filter_(joint_limits(*kinematics_, arm.max_velocity)),
       speeds_(model_->links.size()) {
-  // Obstacles within the padding are not seen.
-  config_.rows.margin += config.ingest.self_filter_padding;
-  config_.rows.stop_distance += config.ingest.self_filter_padding;
+  config_.rows.blind_skin = config.ingest.self_filter_padding;
 }
 
 void FilteredCommand::place_rows(const Simulation& world, Perception* perception,
@@ -177,7 +176,7 @@ void FilteredCommand::place_rows(const Simulation& world, Perception* perception
   kinematics_->place_bodies(joint_poses, Eigen::Isometry3d::Identity(), &bodies);
   builder_.begin(bodies, config);
   builder_.add_links(answers, obstacle_speeds);
-  config.margin = 0.0;
+  config.margin = config.blind_skin = 0.0;
   config.stop_distance = config_.self_stop_distance;
   builder_.set_config(config);
   builder_.add_pairs(own_.run(X_FL));
@@ -194,15 +193,17 @@ void FilteredCommand::hold_others(const std::vector<std::size_t>& commanded) {
   }
 }
 
-// The gradient of the smallest distance from an obstacle; false beyond the stop distance, and where
-// joints do not change it.
+// The gradient of the smallest distance from an obstacle that joints can change: a link that turns
+// about its own axis has none but noise. False beyond the stop distance.
 bool FilteredCommand::way_out(std::vector<double>* wanted) const {
-  double least = config_.rows.stop_distance, fastest = 0.0;
+  double least = config_.rows.stop_distance + config_.rows.blind_skin, fastest = 0.0;
   Eigen::VectorXd away;
   for (std::size_t i = 0; i < rows_.count; ++i) {
     if (rows_.origins[i].is_pair || !(rows_.origins[i].bound < least)) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    if (!(rows_.G.row(row).norm() > kCanLeave * rows_.sweep.row(row).norm())) continue;
     least = rows_.origins[i].bound;
-    away = -rows_.G.row(static_cast<Eigen::Index>(i)).transpose();
+    away = -rows_.G.row(row).transpose();
     fastest = away.cwiseAbs().maxCoeff();
   }
   if (!(fastest > 0.0)) return false;

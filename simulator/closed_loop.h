@@ -40,7 +40,7 @@ struct ClosedLoopConfig {
   QueryConfig query;
   RepulsionConfig repulsion;
   SpeedScaleConfig speed_scale;
-  RowConfig rows;                    ///< the self-filter's padding is added to its distances
+  RowConfig rows;                    ///< blind_skin is the self-filter's padding
   double self_stop_distance = 0.01;  ///< [m] of links from each other, with a margin of 0
   /// [rad/s] of the fastest joint. More than 0: within the stop distance the filter is asked for
   /// the way out from what is nearest, in place of the task.

@@ -303,7 +303,7 @@ Scene make_near_start(const RobotDescription& robot, std::uint64_t seed,
   Scene scene = make_scene(robot, seed, rules, nominal);
   scene.task = 1;
   scene.duration = 0.0;
-  scene.patience = 6.0;
+  scene.patience = 20.0;
   Rng rng(seed);
   const Arm arm(robot, demo_arm());
   const std::vector<Solid> solids = solids_of(robot);
@@ -323,7 +323,7 @@ Scene make_near_start(const RobotDescription& robot, std::uint64_t seed,
       leads_away = next > std::min(last, kAway);
       last = next;
     }
-    if (!leads_away) continue;
+    if (!leads_away || last < kAway) continue;
     scene.obstacles.push_back(ball);
     return scene;
   }

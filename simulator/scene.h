@@ -55,7 +55,7 @@ Scene make_scene(const RobotDescription& robot, std::uint64_t seed, const SceneR
                  const std::function<std::vector<Eigen::VectorXd>(const Scene&)>& nominal);
 
 /// The same arm before one goal: it starts with a ball 15 to 45 mm from one of its links, and the
-/// straight way to the goal leads away from it.
+/// straight way to the goal leads away from it, to 80 mm and more.
 Scene make_near_start(const RobotDescription& robot, std::uint64_t seed,
                       const std::function<std::vector<Eigen::VectorXd>(const Scene&)>& nominal);
 

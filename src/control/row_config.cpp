@@ -17,6 +17,7 @@ void check_all(const RowConfig& c, const Check& check) {
   check(c.escape_speed >= 0.0, "escape_speed", c.escape_speed, "0 m/s or more");
   check(c.obstacle_speed >= 0.0, "obstacle_speed", c.obstacle_speed, "0 m/s or more");
   check(c.age >= 0.0, "age", c.age, "0 s or more");
+  check(c.blind_skin >= 0.0, "blind_skin", c.blind_skin, "0 m or more");
   check(c.linear_error > 0.0, "linear_error", c.linear_error, "more than 0 m");
 }
 

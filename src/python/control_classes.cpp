@@ -56,11 +56,11 @@ Span<const double> span(const DoubleArray& array) {
 PyRows make_rows(const Robot& robot, const DoubleArray& q, const Distances& distances,
                  double horizon, double margin, double stop_distance, double approach_time,
                  double retreat_speed, double escape_speed, double obstacle_speed, double age,
-                 double linear_error) {
+                 double blind_skin, double linear_error) {
   check_shape(q, 1, static_cast<py::ssize_t>(robot.joints().size()),
               "q has the shape (joints,), joints being the number of Robot.joints");
   const RowConfig config{horizon,      margin,         stop_distance, approach_time, retreat_speed,
-                         escape_speed, obstacle_speed, age,           linear_error};
+                         escape_speed, obstacle_speed, age,           blind_skin,    linear_error};
   const std::vector<std::string> errors = config_errors(config);
   if (!errors.empty()) throw py::value_error(errors.front());
   const std::vector<LinkProximity> answers = to_answers(distances, robot.links().size());
@@ -117,8 +117,9 @@ horizon: [s] until another velocity takes the place of this one.
 margin: [m] what is proven to be left. stop_distance: [m] nearer, no witness is approached.
 approach_time: [s] in which what is left above the stop distance may be used.
 retreat_speed: [m/s] asked for within the stop distance; 0: a retreat is free, and not asked for.
-escape_speed: [m/s] of points on the way out of contact.
+escape_speed: [m/s] of points nearer than the margin; a fifth of it in contact.
 obstacle_speed: [m/s] at most, of the obstacles. age: [s] of their measurement.
+blind_skin: [m] nearer, obstacles need not be among the distances, as in a self-filter's padding.
 linear_error: [m] that `radius` leaves.
 
 Raises ValueError for another shape, or a setting that is out of range.)";
@@ -179,6 +180,7 @@ void define_control(py::module_* module) {
               py::arg("retreat_speed") = config.retreat_speed,
               py::arg("escape_speed") = config.escape_speed,
               py::arg("obstacle_speed") = config.obstacle_speed, py::arg("age") = config.age,
+              py::arg("blind_skin") = config.blind_skin,
               py::arg("linear_error") = config.linear_error);
 
   py::class_<PyFilterAnswer>(*module, "FilterAnswer", "A velocity that may be commanded, and why.")

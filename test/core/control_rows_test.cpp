@@ -306,10 +306,18 @@ TEST_F(RowsOfAnswers, LeaveTheWayOutOfContactAndOfTheStopDistance) {
   EXPECT_TRUE(row(near(0.03), config).origins[0].is_proven);
   EXPECT_EQ(row(near(-0.01), config).h[0], 0.0);
   EXPECT_FALSE(row(near(-0.01), config).origins[0].is_proven);
-  EXPECT_EQ(row(near(-0.01), config).sweep_limit[0], config.escape_speed);
+  EXPECT_NEAR(row(near(0.005), config).sweep_limit[0], config.escape_speed, 1e-12);
+  EXPECT_NEAR(row(near(-0.01), config).sweep_limit[0], config.escape_speed / 5.0, 1e-12);
   config.retreat_speed = 0.1;
-  EXPECT_EQ(row(near(-0.01), config).h[0], -0.1);
+  EXPECT_EQ(row(near(0.005), config).h[0], -0.1);
+  EXPECT_NEAR(row(near(-0.01), config).h[0], -0.1 / 5.0, 1e-12);
   EXPECT_NEAR(row(near(0.15), config).h[0], 0.1 / config.approach_time, 1e-8);
+  // What may be nearer than the answer says is as contact.
+  config.blind_skin = 0.03;
+  EXPECT_FALSE(row(near(0.02), config).origins[0].is_proven);
+  EXPECT_NEAR(row(near(0.02), config).sweep_limit[0], config.escape_speed / 5.0, 1e-12);
+  EXPECT_TRUE(row(near(0.035), config).origins[0].is_proven);
+  EXPECT_NEAR(row(near(0.035), config).sweep_limit[0], config.escape_speed, 1e-12);
 }
 
 TEST_F(RowsOfAnswers, CountTheObstaclesSpeedAndAge) {

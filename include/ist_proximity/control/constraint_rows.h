@@ -25,14 +25,17 @@ struct RowConfig {
   double margin = 0.01;         ///< [m] >= 0: what is proven to be left
   double stop_distance = 0.05;  ///< [m] >= margin: nearer than this, no witness is approached
   double approach_time = 0.2;   ///< [s] >= horizon, in which what is left of a distance may be used
-  /// [m/s] >= 0: the most that a link within the stop distance is asked to retreat; 0: it may
-  /// retreat, and need not.
+  /// [m/s] >= 0: the most that a link within the stop distance is asked to retreat; in contact a
+  /// fifth of it. 0: it may retreat, and need not.
   double retreat_speed = 0.0;
-  /// [m/s] >= 0: how fast points of a link may move that is nearer than the margin, and on the way
-  /// out of contact, which no bound proves to be free.
+  /// [m/s] >= 0: how fast points of a link may move that is nearer than the margin; a fifth of it
+  /// on the way out of contact, which no bound proves to be free.
   double escape_speed = 0.05;
   double obstacle_speed = 0.0;  ///< [m/s] >= 0: obstacles may come at least this fast
   double age = 0.0;             ///< [s] >= 0, of the obstacles' measurement at the poses' instant
+  /// [m] >= 0: obstacles nearer than this need not be in the answers, as within the padding of a
+  /// self-filter. It is added to margin and stop_distance.
+  double blind_skin = 0.0;
   double linear_error = 0.001;  ///< [m] > 0 that ConstraintRows::radius leaves
 };
 
@@ -66,9 +69,9 @@ struct RowOrigin {
 ///
 /// Theorem. Joints move at a constant velocity that meets `sweep` for the time T = horizon, and
 /// obstacles move no faster than their speed v. With b = lower_bound - v (age + T), the distance of
-/// the link to every obstacle that the answer is about, nearest or not, remains >= margin where
-/// b >= margin, and >= b / 2 where 0 < b < margin.
-/// Proof. sweep_limit T is D = b - margin or at most b / 2, and sweep[k] is r_k + D, with r_k the
+/// the link to every obstacle that the answer is about, nearest or not, remains >= m where b >= m,
+/// and >= b / 2 where blind_skin < b < m, with m = margin + blind_skin.
+/// Proof. sweep_limit T is D = b - m or at most b / 2, and sweep[k] is r_k + D, with r_k the
 /// largest distance of the link's box from the axis of joint k (1 for a sliding joint). The
 /// distance of the link's points from the axis of joint k changes by what the joints between k and
 /// the link move them, so it stays below r_k + D as long as those joints have moved them by less
@@ -76,9 +79,9 @@ struct RowOrigin {
 /// moves farther than sum_k sweep[k] |dq_k| T <= D, and obstacles come nearer by v (age + T) at
 /// most. For a pair both links' motions in their nearest common body are in the sum.
 ///
-/// In contact (b <= 0) nothing can be proven: sweep lets points move at escape_speed, and G leaves
-/// the way out only. Where the way is not known, or the link is UNKNOWN, sweep_limit is 0, and
-/// every joint that moves the link must stand.
+/// In contact (b <= blind_skin) nothing can be proven: sweep lets points move at a fifth of
+/// escape_speed, and G leaves the way out only. Where the way is not known, or the link is UNKNOWN,
+/// sweep_limit is 0, and every joint that moves the link must stand.
 ///
 /// Certified linearisation: let s(q) be the distance of the witness on the obstacle from the plane
 /// with normal n through the witness on the link, fixed to that link. For |step|_2 <= radius[i],

@@ -152,9 +152,7 @@ const ConstraintRows& ProximityRows::rows(const PlacedAnswers& obstacles, const 
                                           const std::vector<double>& q_now, const RowConfig& config,
                                           double self_stop_distance) {
   RowConfig of_obstacles = config;
-  const double skin = blind_skin(*obstacles.message);
-  of_obstacles.margin += skin;
-  of_obstacles.stop_distance += skin;
+  of_obstacles.blind_skin = blind_skin(*obstacles.message);
   read(obstacles, self);
   place(q_now, &now_);
   const ConstraintRows& rows = builder_->rows();
