@@ -24,7 +24,7 @@ using XmlRpc::XmlRpcValue;
 constexpr char kOnlyGroup[] = "Default";
 constexpr const char* kGroups[] = {"query", "repulsion", "speed_scale", "speed_scale/separation"};
 constexpr char kKept[] = "the last valid ~query, ~repulsion and ~speed_scale stay in use: ";
-constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
+constexpr std::chrono::seconds kRepeatLog(30), kRepeatRefusal(5), kPatience(3);
 
 /// A group is a dictionary, without the dictionaries in it.
 std::vector<Parameter> rows_of(const std::string& group, ServerConfig* config) {
@@ -265,9 +265,8 @@ bool LiveParameters::set(Group* group, const Config& wanted, Config* answer) {
   for (const auto& one : change) {
     const auto is_this = [&one](const Parameter& row) { return name_in_group(row) == one.first; };
     if (std::any_of(rows.begin(), rows.end(), is_this)) continue;
-    ROS_WARN_STREAM_THROTTLE(5.0, "a request to " << private_nh_.getNamespace() << "/"
-                                                  << group->name << "/set_parameters is refused: '"
-                                                  << one.first << "' is none of its parameters");
+    log_refusal("a request to " + private_nh_.getNamespace() + "/" + group->name +
+                "/set_parameters is refused: '" + one.first + "' is none of its parameters");
     return false;
   }
   const bool answered = read_server() && apply(group->name, change);
@@ -287,7 +286,7 @@ bool LiveParameters::apply(const std::string& group, const Values& change) {
   for (const auto& [name, value] : change) (*members)[name] = value;
   const LiveReading reading = parse_live(tree, config());
   if (!reading.errors.empty()) {
-    ROS_WARN_STREAM_THROTTLE(5.0, kKept << join(reading.errors, "; "));
+    log_refusal(kKept + join(reading.errors, "; "));
     return true;
   }
   for (const auto& [name, value] : change) {
@@ -298,6 +297,15 @@ bool LiveParameters::apply(const std::string& group, const Values& change) {
   }
   take(reading);
   return true;
+}
+
+/// The response has no place for a reason. The caller holds change_mutex_.
+void LiveParameters::log_refusal(const std::string& reason) {
+  const auto now = Clock::now();
+  if (reason == logged_refusal_ && now - refusal_time_ < kRepeatRefusal) return;
+  logged_refusal_ = reason;
+  refusal_time_ = now;
+  ROS_WARN_STREAM(reason);
 }
 
 void LiveParameters::publish_updates() {

@@ -68,6 +68,7 @@ class LiveParameters {
   void note_startup_changes(const XmlRpc::XmlRpcValue& tree);
   std::string lost_names(const std::set<std::string>& found) const;
   void set_problem(const std::string& problem);
+  void log_refusal(const std::string& reason);
   void publish_updates();
 
   ros::NodeHandle private_nh_;
@@ -78,6 +79,8 @@ class LiveParameters {
   std::optional<Values> at_start_;
   std::string logged_problem_;
   Clock::time_point logged_time_;
+  std::string logged_refusal_;
+  Clock::time_point refusal_time_;
 
   mutable std::mutex live_mutex_;  ///< guards the members below
   ServerConfig live_;
