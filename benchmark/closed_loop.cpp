@@ -2,8 +2,8 @@
 // kind in turn: bodies that cross its path, bodies that stand in it, people who walk past, bodies
 // that are hidden from both cameras half of the time, and goals between which the arm would touch
 // itself. Each is run without avoidance, with the speed scale alone, with the repulsion alone, and
-// with the velocity filter, which is told how fast bodies of this kind move; and as many starts
-// within the stop distance.
+// with the velocity filter, which is told how fast bodies of this kind move, and how long they hide;
+// and as many starts within the stop distance.
 //
 // Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--only "velocity
 // filter"]
@@ -163,10 +163,11 @@ SceneResult run_scene(const ist::RobotDescription& robot,
     if (!is_asked(m, only)) continue;
     config.avoidance = kModes[m].avoidance;
     config.scale_speed = kModes[m].scale_speed;
-    config.rows.obstacle_speed = 0.0;
+    config.rows.obstacle_speed = config.rows.age = 0.0;
     config.leave_speed = config.controller.task_speed;
     result.starts[m] = ist::sim::run_closed_loop(robot, model, start, seed, config);
     config.rows.obstacle_speed = speed_of(rules);
+    config.rows.age = result.kind == kHidden ? 0.5 * ist::sim::HiddenRules().period : 0.0;
     config.leave_speed = 0.0;
     result.modes[m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
     tell(seed, m, result);

@@ -260,6 +260,12 @@ class VelocityFilterTest(unittest.TestCase):
         self.assertGreaterEqual(self.nearest, STOP + PADDING - 0.005)
         self.assertEqual([s.blind_skin for s in self.node.wait_for_status(ProximityArray.OK).sources], [PADDING])
 
+    def test_stops_where_what_hides_may_have_come(self):
+        self.start(0.5, 0.0, obstacle_speed=0.4, obstacle_age=0.5)
+        self.wait_for(FilterState.LIMITED)
+        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
+        self.assertGreaterEqual(self.nearest, STOP + 0.4 * 0.5 - 0.005)
+
     def test_stops_before_a_post_of_its_own(self):
         self.start(0.0, 0.4, self_proximity=True)
         limited = self.wait_for(FilterState.LIMITED)

@@ -32,7 +32,9 @@ struct RowConfig {
   /// on the way out of contact, which no bound proves to be free.
   double escape_speed = 0.05;
   double obstacle_speed = 0.0;  ///< [m/s] >= 0: obstacles may come at least this fast
-  double age = 0.0;             ///< [s] >= 0, of the obstacles' measurement at the poses' instant
+  /// [s] >= 0: age of the obstacles' measurement at the poses' instant, or how long they may have
+  /// moved unseen.
+  double age = 0.0;
   /// [m] >= 0: obstacles nearer than this need not be in the answers, as within the padding of a
   /// self-filter. It is added to margin and stop_distance.
   double blind_skin = 0.0;

@@ -370,7 +370,7 @@ const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::T
   history_->at(now, &q_now_);
   RowConfig config = config_.rows;
   const ros::Time& seen = answers.cloud_stamp.isZero() ? answers.header.stamp : answers.cloud_stamp;
-  config.age = std::max(0.0, seconds_between(seen, now));
+  config.age = std::max(config.age, seconds_between(seen, now));
   // The robot has gone on since its joints were stated.
   config.horizon += history_->age(now);
   config.approach_time = std::max(config.approach_time, config.horizon);

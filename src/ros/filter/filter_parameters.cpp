@@ -32,6 +32,7 @@ FilterConfig read_filter_config(const XmlRpc::XmlRpcValue& tree, std::vector<std
            {"retreat_speed", &rows.retreat_speed, speed},
            {"escape_speed", &rows.escape_speed, speed},
            {"obstacle_speed", &rows.obstacle_speed, speed},
+           {"obstacle_age", &rows.age, Range::non_negative("s", 60.0)},
        }) {
     reader.read(parameter);
   }
