@@ -25,6 +25,11 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_compile_options(--param=ggc-min-heapsize=1000000)
 endif()
 
+# No copy of the SIMD code for SSSE3: processors without SSE4 are of 2007.
+if(NOT IST_PROXIMITY_SANITIZE AND NOT IST_PROXIMITY_FUZZ)
+  add_compile_definitions(HWY_DISABLED_TARGETS=HWY_SSSE3)
+endif()
+
 if(IST_PROXIMITY_SANITIZE)
   add_compile_options(
     -fsanitize=${IST_PROXIMITY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
