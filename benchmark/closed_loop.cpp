@@ -2,12 +2,11 @@
 // kind in turn: bodies that cross its path, bodies that stand in it, people who walk past, bodies
 // that are hidden from both cameras half of the time, and goals between which the arm would touch
 // itself. Each is run without avoidance, with the speed scale alone, with the repulsion alone, and
-// with the velocity filter, which is told how fast bodies of this kind move, and how long they hide;
+// with the velocity filter, which is told how fast bodies of this kind move and how long they hide;
 // and as many starts within the stop distance.
 //
-// Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--only "velocity
-// filter"]
-//                    [--update-doc doc/benchmark.md]
+// Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM]
+//                    [--only "velocity filter"] [--update-doc doc/benchmark.md]
 //        closed_loop --filter-runs 30000 [--update-doc doc/benchmark.md]
 // The second one measures how long the filter takes.
 
