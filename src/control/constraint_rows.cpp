@@ -24,16 +24,18 @@ bool moves(const Kinematics::Joint& joint) {
 
 // [m/s] The largest rate of approach to the nearest obstacle.
 double approach_limit(const RowConfig& config, double bound, double speed) {
-  const double left = bound - speed * config.age - config.stop_distance - config.blind_skin;
-  const double limit = left / config.approach_time - speed;
-  return limit < 0.0 ? std::max(limit, -config.retreat_speed) : (1.0 - kRounding) * limit;
+  const double stop_distance = config.stop_distance + config.blind_skin;
+  const double limit = (bound - speed * config.age - stop_distance) / config.approach_time - speed;
+  if (limit >= 0.0) return (1.0 - kRounding) * limit;
+  return std::max(-config.retreat_speed, limit);  // of NaN, as with an infinite speed: the first
 }
 
 // [m] How far points of a link whose obstacles are `bound` away may move, proven to touch nothing.
 double free_motion(const RowConfig& config, double bound) {
   const double margin = config.margin + config.blind_skin;
   if (bound > margin) return (1.0 - kRounding) * (bound - margin);
-  return std::min(0.5 * std::max(bound, 0.0), config.escape_speed * config.horizon);
+  if (!(bound > config.blind_skin)) return 0.0;
+  return std::min(0.5 * bound, config.escape_speed * config.horizon);
 }
 
 }  // namespace
@@ -278,7 +280,7 @@ void ConstraintRowBuilder::add(const Answer& answer, const Body& first, const Bo
   origin.is_proven = bound > config_.blind_skin || !has_way;
   if (!origin.is_proven) {
     motion = kContactShare * config_.escape_speed * config_.horizon;
-    rows_.h[row] *= kContactShare;
+    rows_.h[row] = std::min(kContactShare * rows_.h[row], 0.0);  // above 0 by rounding
   }
   levers_.setZero();
   add_sweep(first, ancestor, motion);

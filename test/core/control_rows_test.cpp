@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <set>
 #include <string>
 #include <vector>
@@ -297,6 +298,12 @@ TEST_F(RowsOfAnswers, AllowNoMotionOfWhatIsNotKnown) {
   LinkProximity lost = near(-0.01);
   lost.direction.setConstant(std::nan(""));
   EXPECT_EQ(row(lost).sweep_limit[0], 0.0);
+  // Nothing is known about what is within the blind skin, and there is no way out.
+  RowConfig config;
+  config.blind_skin = 0.15;
+  LinkProximity clear = near(0.1);
+  clear.state = LinkState::kClear;
+  EXPECT_EQ(row(clear, config).sweep_limit[0], 0.0);
 }
 
 TEST_F(RowsOfAnswers, LeaveTheWayOutOfContactAndOfTheStopDistance) {
@@ -330,6 +337,24 @@ TEST_F(RowsOfAnswers, CountTheObstaclesSpeedAndAge) {
   const double unstated = row(near(0.25), config).h[0];
   EXPECT_EQ(row(near(0.25), config, std::nan("")).h[0], unstated);
   EXPECT_LT(row(near(0.25), config, 0.1).h[0], unstated);
+}
+
+TEST_F(RowsOfAnswers, ApproachNothingInContactWhateverIsRounded) {
+  test::Rng rng(475);
+  RowConfig config;
+  config.margin = config.stop_distance = 0.0;
+  for (int trial = 0; trial < test::scaled(2000); ++trial) {
+    config.horizon = config.approach_time = test::power_of_ten(&rng, -3.0, 0.0);
+    config.obstacle_speed = test::power_of_ten(&rng, -3.0, 3.0);
+    config.age = test::power_of_ten(&rng, -3.0, 0.0);
+    config.blind_skin = test::uniform(&rng, 0.0, 0.1);
+    const double bound = config.obstacle_speed * (config.age + config.horizon) + config.blind_skin;
+    const ConstraintRows& rows = row(near(bound), config);
+    if (!rows.origins[0].is_proven) ASSERT_LE(rows.h[0], 0.0) << trial;
+  }
+  // A speed without bound is a number in no row.
+  config.age = 0.0;
+  EXPECT_EQ(row(near(0.3), config, std::numeric_limits<double>::infinity()).h[0], 0.0);
 }
 
 TEST_F(RowsOfAnswers, AreBoundedInAnotherWayFromThereOn) {

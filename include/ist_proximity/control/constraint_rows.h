@@ -71,8 +71,8 @@ struct RowOrigin {
 ///
 /// Theorem. Joints move at a constant velocity that meets `sweep` for the time T = horizon, and
 /// obstacles move no faster than their speed v. With b = lower_bound - v (age + T), the distance of
-/// the link to every obstacle that the answer is about, nearest or not, remains >= m where b >= m,
-/// and >= b / 2 where blind_skin < b < m, with m = margin + blind_skin.
+/// the link to every obstacle that the answer is about, nearest or not, remains >= m where b > m,
+/// and >= b / 2 where blind_skin < b <= m, with m = margin + blind_skin.
 /// Proof. sweep_limit T is D = b - m or at most b / 2, and sweep[k] is r_k + D, with r_k the
 /// largest distance of the link's box from the axis of joint k (1 for a sliding joint). The
 /// distance of the link's points from the axis of joint k changes by what the joints between k and
