@@ -17,6 +17,8 @@ constexpr double kGrowth = 0.1;       // [m] by which levers may grow within a c
 // The share of escape and retreat speed in contact, where the way out may lead into what is not
 // seen. At the defaults a millimetre, after which distances prove more, takes a tenth of a second.
 constexpr double kContactShare = 0.2;
+// The share of the retreat that a row's sweep allows which it asks for at most: others want a part.
+constexpr double kRetreatShare = 0.5;
 
 bool moves(const Kinematics::Joint& joint) {
   return joint.type != JointType::kFixed && !joint.has_unstated_pose();
@@ -285,9 +287,21 @@ void ConstraintRowBuilder::add(const Answer& answer, const Body& first, const Bo
   levers_.setZero();
   add_sweep(first, ancestor, motion);
   if (second != nullptr) add_sweep(*second, ancestor, motion);
-  if (!levers_.allFinite()) return;
-  rows_.sweep.row(row) = levers_.transpose();
-  rows_.sweep_limit[row] = motion / config_.horizon;
+  if (levers_.allFinite()) {
+    rows_.sweep.row(row) = levers_.transpose();
+    rows_.sweep_limit[row] = motion / config_.horizon;
+  }
+  if (rows_.h[row] < 0.0) rows_.h[row] = std::max(rows_.h[row], -kRetreatShare * retreat(row));
+}
+
+// [m/s] The fastest retreat that the sweep of a row allows: of the joint with the best lever.
+double ConstraintRowBuilder::retreat(Eigen::Index row) const {
+  double best = 0.0;
+  for (Eigen::Index c = 0; c < rows_.G.cols(); ++c) {
+    const double lever = rows_.sweep(row, c);
+    if (lever > 0.0) best = std::max(best, std::abs(rows_.G(row, c)) / lever);
+  }
+  return best * std::min(rows_.sweep_limit[row], std::numeric_limits<double>::max());
 }
 
 ConstraintRows constraint_rows(const RobotModel& model,

@@ -153,7 +153,7 @@ struct VelocityFilter::Impl {
         approach += rows.G(i, k) * target[k];
         sweep += rows.sweep(i, k) * std::abs(target[k]);
       }
-      factors.keep(approach, rows.h[i]);
+      factors.keep(approach, std::max(rows.h[i], 0.0));  // 0 is no retreat that is asked for
       factors.keep(sweep, rows.sweep_limit[i]);
     }
     return factors;

@@ -82,6 +82,12 @@ Problem random_problem(test::Rng* rng, std::size_t joints, std::size_t count, Me
   return problem;
 }
 
+// The same where a retreat is free, and not asked for: what a share of the command has to meet.
+Problem without_retreats(Problem problem) {
+  problem.rows.h = problem.rows.h.cwiseMax(0.0);
+  return problem;
+}
+
 // Every linear inequality a y <= b of a problem in y = sqrt(weight) * velocity.
 struct Inequalities {
   std::vector<Eigen::VectorXd> a;
@@ -194,7 +200,7 @@ TEST(VelocityFilter, IsNearestInRandomProblems) {
       ASSERT_EQ(met_by, MetBy::kUnknown) << trial;
       ASSERT_GT(all.least_excess(), 1e-12) << trial;
       ASSERT_FALSE(answer.rows.empty()) << trial;
-      if (answer.status == FilterStatus::kScaled) ASSERT_LT(all.excess(answer.velocity), 1e-8);
+      ASSERT_LT(Inequalities(without_retreats(problem)).excess(answer.velocity), 1e-8) << trial;
       continue;
     }
     ASSERT_EQ(answer.reason, FilterReason::kNone) << trial;
@@ -317,7 +323,7 @@ TEST(VelocityFilter, ScaleIsTheLargestShareOfTheCommand) {
                                            trial % 2 == 0 ? MetBy::kZero : MetBy::kUnknown);
     VelocityFilter filter(problem.limits, problem.weights);
     const double scale = filter.run(problem.command, problem.q, problem.rows).scale;
-    const Inequalities all(problem);
+    const Inequalities all(without_retreats(problem));
     const auto excess = [&](double share) {
       std::vector<double> velocity = problem.command;
       for (double& one : velocity) one *= share;
@@ -347,6 +353,16 @@ TEST(VelocityFilter, ScaleLetsTheRobotLeave) {
   EXPECT_EQ(filter.run({0.5}, {0.0}, rows).scale, 0.0);
   rows.h[0] = 0.1;
   EXPECT_NEAR(filter.run({0.5}, {0.0}, rows).scale, 0.2, 1e-12);
+  // A slower retreat than the one that is asked for is better than none.
+  rows.h[0] = -0.8;
+  EXPECT_EQ(filter.run({-0.5}, {0.0}, rows).scale, 1.0);
+  EXPECT_EQ(filter.run({0.5}, {0.0}, rows).scale, 0.0);
+  rows.sweep(0, 0) = 1.0;
+  rows.sweep_limit[0] = 0.1;
+  const FilterAnswer& slower = filter.run({-0.5}, {0.0}, rows);
+  EXPECT_EQ(slower.status, FilterStatus::kScaled);
+  EXPECT_EQ(slower.reason, FilterReason::kContradiction);
+  EXPECT_NEAR(slower.velocity[0], -0.1, 1e-12);
   rows.sweep(0, 0) = 1.0;
   rows.sweep_limit[0] = 0.0;  // the link is UNKNOWN
   EXPECT_EQ(filter.run({-0.5}, {0.0}, rows).scale, 0.0);

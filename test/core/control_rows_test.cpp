@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/control/velocity_filter.h"
 #include "support/control_robots.h"
 #include "support/data_dir.h"
 #include "support/random_numbers.h"
@@ -316,15 +317,33 @@ TEST_F(RowsOfAnswers, LeaveTheWayOutOfContactAndOfTheStopDistance) {
   EXPECT_NEAR(row(near(0.005), config).sweep_limit[0], config.escape_speed, 1e-12);
   EXPECT_NEAR(row(near(-0.01), config).sweep_limit[0], config.escape_speed / 5.0, 1e-12);
   config.retreat_speed = 0.1;
-  EXPECT_EQ(row(near(0.005), config).h[0], -0.1);
-  EXPECT_NEAR(row(near(-0.01), config).h[0], -0.1 / 5.0, 1e-12);
+  EXPECT_EQ(row(near(0.03), config).h[0], -0.1);
   EXPECT_NEAR(row(near(0.15), config).h[0], 0.1 / config.approach_time, 1e-8);
+  RowConfig fast = config;
+  fast.escape_speed = 5.0;
+  EXPECT_NEAR(row(near(-0.01), fast).h[0], -0.1 / 5.0, 1e-12);
   // What may be nearer than the answer says is as contact.
   config.blind_skin = 0.03;
   EXPECT_FALSE(row(near(0.02), config).origins[0].is_proven);
   EXPECT_NEAR(row(near(0.02), config).sweep_limit[0], config.escape_speed / 5.0, 1e-12);
   EXPECT_TRUE(row(near(0.035), config).origins[0].is_proven);
   EXPECT_NEAR(row(near(0.035), config).sweep_limit[0], config.escape_speed, 1e-12);
+}
+
+TEST_F(RowsOfAnswers, AskForNoRetreatThatTheyForbid) {
+  RowConfig config;
+  config.retreat_speed = 1.0;
+  VelocityFilter filter(joint_limits(*robot_.kinematics, 2.0));
+  const std::vector<double> zero(robot_.joints.size(), 0.0);
+  for (const double bound : {-0.01, 0.0001, 0.005, 0.0101, 0.03}) {
+    const ConstraintRows& rows = row(near(bound), config);
+    const FilterAnswer& answer = filter.run(zero, zero, rows);
+    EXPECT_EQ(answer.reason, FilterReason::kNone) << bound;
+    const Eigen::Map<const Eigen::VectorXd> velocity(answer.velocity.data(), columns());
+    EXPECT_LT(rows.G.row(0).dot(velocity), 0.0) << bound;
+  }
+  config.escape_speed = 0.0;
+  EXPECT_EQ(row(near(-0.01), config).h[0], 0.0);
 }
 
 TEST_F(RowsOfAnswers, CountTheObstaclesSpeedAndAge) {

@@ -67,7 +67,8 @@ struct RowOrigin {
 /// on the link (of a pair: of the first link's less that of the second's); so G * dq is the rate at
 /// which the nearest obstacle is approached, and -G the gradient of the distance by q. h rests on
 /// lower_bound: what it leaves above the stop distance per approach_time, less the obstacles'
-/// speed. Within the stop distance h is not above 0: no approach, and retreat is free.
+/// speed. Within the stop distance h is not above 0: no approach, and retreat is free. Below 0 it
+/// asks for a retreat, of no more than half of what `sweep` allows.
 ///
 /// Theorem. Joints move at a constant velocity that meets `sweep` for the time T = horizon, and
 /// obstacles move no faster than their speed v. With b = lower_bound - v (age + T), the distance of
@@ -179,6 +180,7 @@ class ConstraintRowBuilder {
   void add_sweep(const Body& link, std::size_t ancestor, double growth);
   bool add_gradient(const Answer& answer, Eigen::Index row);
   double certified_radius(const Answer& answer, std::size_t ancestor);
+  double retreat(Eigen::Index row) const;
   void add(const Answer& answer, const Body& first, const Body* second);
 
   std::shared_ptr<const Kinematics> kinematics_;

@@ -74,8 +74,9 @@ std::string describe(const FilterAnswer& answer, const ConstraintRows& rows,
 ///
 /// The answer is the command times the largest factor from 0 to 1 that meets rows, speed and
 /// position limits, or 0, where no velocity meets all bounds or the time is over; acceleration
-/// limits give way to it. Nothing that violates a row is given but 0, which may when
-/// a row asks for a retreat. Any fault of the input gives 0.
+/// limits give way to it. A row that asks for a retreat (h < 0) forbids it an approach alone, since
+/// 0 would be none either. Nothing else that violates a row is given. Any fault of the input
+/// gives 0.
 ///
 /// run() allocates nothing, locks nothing and never throws. One object per thread.
 class VelocityFilter {
