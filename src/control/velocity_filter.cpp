@@ -169,17 +169,21 @@ struct VelocityFilter::Impl {
     }
   }
 
-  // Whether the velocity x meets the rows, to rounding.
+  // Whether the velocity x meets the rows, to the rounding of each row's own sum: a joint that is
+  // as fast as numbers are excuses no row that it is not in.
   bool is_met(const ConstraintRows& rows) const {
-    if (!x.allFinite()) return false;  // commands may be as large as numbers are
-    const double slack = kNegligible * (1.0 + x.lpNorm<1>());
+    if (!x.allFinite()) return false;
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows.count); ++i) {
-      double approach = 0.0, sweep = 0.0;
+      double approach = 0.0, sum = 0.0, sweep = 0.0;
       for (Eigen::Index k = 0; k < joints; ++k) {
         approach += rows.G(i, k) * x[k];
+        sum += std::abs(rows.G(i, k) * x[k]);
         sweep += rows.sweep(i, k) * std::abs(x[k]);
       }
-      if (!(approach <= rows.h[i] + slack && sweep <= rows.sweep_limit[i] + slack)) return false;
+      if (!(approach <= rows.h[i] + kNegligible * (1.0 + sum) &&
+            sweep <= rows.sweep_limit[i] + kNegligible * (1.0 + sweep))) {
+        return false;
+      }
     }
     return true;
   }

@@ -263,6 +263,19 @@ TEST(VelocityFilter, StandsWhereAnInputCannotBeUsed) {
   expect_standing(filter.run(command, zero, bad), FilterReason::kRows);
 }
 
+// A joint without a speed limit that is to be endlessly fast excuses none of the other ones.
+TEST(VelocityFilter, KeepsRowsBesideCommandsAsLargeAsNumbersAre) {
+  VelocityFilter filter({{kInf, kInf}, {}, {}, {}});
+  ConstraintRows rows = empty_rows(1, 2);
+  rows.G(0, 0) = rows.sweep(0, 0) = 1.0;
+  rows.h[0] = rows.sweep_limit[0] = 0.01;
+  for (const double fast : {1.0, 1e9, 1e12, 1e300}) {
+    const FilterAnswer& answer = filter.run({0.5, fast}, {0.0, 0.0}, rows);
+    EXPECT_LT(answer.velocity[0], 0.01 + 1e-8) << fast;
+    EXPECT_GT(answer.velocity[0], 0.01 - 1e-8) << fast;
+  }
+}
+
 TEST(VelocityFilter, KeepsPositionLimits) {
   VelocityFilter filter({{1.0, 1.0}, {-1.0, -1.0}, {1.0, 1.0}, {}});
   ConstraintRows rows = empty_rows(0, 2);
