@@ -504,6 +504,14 @@ class VelocityFilterTest(unittest.TestCase):
         self.world.repeat(50, answer_ahead)
         self.check_fault("ahead of the clock")
 
+        # What else no node says: a skin that is no length.
+        ahead = rospy.Duration(0.0)
+        for skin in (-0.1, np.inf, -np.inf):
+            newest.sources[0].blind_skin = skin
+            self.check_fault("blind_skin of source 'cloud' is %g m" % skin)
+        newest.sources[0].blind_skin = np.nan
+        self.wait_for(FilterState.FREE)
+
     def test_joint_states_that_come_seldom(self):
         """Between them, the robot has moved by all that was given."""
         self.count = 0
@@ -565,6 +573,8 @@ class VelocityFilterTest(unittest.TestCase):
     def test_wrong_parameters_are_refused(self):
         self.check_refused({"margin": -1.0, "command_type": "Twist"}, ["~margin", "~command_type"])
         self.check_refused({"margin": 0.01, "command_type": "geometry_msgs/Twist"}, ["~tool is empty"])
+        for age in (float("nan"), float("inf"), -1.0, "0.5", [0.5]):
+            self.check_refused({"obstacle_age": age}, ["~obstacle_age is "])
 
     def check_refused(self, parameters, texts):
         for name, value in parameters.items():

@@ -310,6 +310,12 @@ std::string CommandFilter::why_not(const PlacedAnswers& placed, const ros::Subsc
   if (age < -kToldSkew) {
     return format_text("the distances are %.2f s ahead of the clock; compare the clocks", -age);
   }
+  for (const ist_proximity::SourceStatus& source : answers.sources) {
+    // NaN: there is no self-filter.
+    if (!(source.blind_skin < 0.0) && !std::isinf(source.blind_skin)) continue;
+    return format_text("the blind_skin of source '%s' is %g m in '%s'; it has to be 0 m or more",
+                       source.name.c_str(), source.blind_skin, subscriber.getTopic().c_str());
+  }
   return placed.fault;
 }
 
