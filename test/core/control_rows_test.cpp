@@ -179,14 +179,21 @@ TEST(ConstraintRows, SweepLeavesTheMargin) {
     for (int trial = 0; trial < test::scaled(1500); ++trial) {
       config.horizon = test::power_of_ten(&rng, -3.0, 0.0);
       config.approach_time = 1.0;
+      // Half of them with obstacles that come, and a skin in which some may be hidden.
+      const bool hides = test::chance(&rng, 0.5);
+      config.blind_skin = hides ? test::uniform(&rng, 0.0, 0.03) : 0.0;
+      config.age = test::uniform(&rng, 0.0, 0.2);
+      config.obstacle_speed = hides ? test::uniform(&rng, 0.0, 0.1) : 0.0;
+      const double come = config.obstacle_speed * (config.age + config.horizon);
+      const double margin = config.margin + config.blind_skin;
       Scene scene(&robot, &rng, 8, 0.2);
       const ConstraintRows rows = scene.rows(config);
       for (std::size_t i = 0; i < rows.count; ++i) {
         const auto row = static_cast<Eigen::Index>(i);
         const auto link = static_cast<std::size_t>(rows.origins[i].index);
-        const double bound = rows.origins[i].bound;
-        if (!(bound > 0.0)) continue;
-        const double left = bound > config.margin ? config.margin : 0.5 * bound;
+        const double bound = rows.origins[i].bound - come;
+        if (!(bound > config.blind_skin)) continue;
+        const double left = bound > margin ? margin : 0.5 * bound;
         Eigen::VectorXd velocity = random_step(&rng, scene.q.size(), 1.0);
         // Half of them approach the witness.
         if (trial % 2 == 0) velocity = rows.G.row(row).transpose();
@@ -195,7 +202,7 @@ TEST(ConstraintRows, SweepLeavesTheMargin) {
         velocity *= rows.sweep_limit[row] / swept;
         for (const double part : {1.0, test::uniform(&rng, 0.0, 1.0)}) {
           robot.place(scene.q + part * config.horizon * velocity);
-          const double distance = robot.exact_distance(link, scene.points);
+          const double distance = robot.exact_distance(link, scene.points) - come;
           ASSERT_GE(distance, left - 1e-9) << robot.name << " " << trial;
           closest = std::min(closest, (distance - left) / (bound - left));
         }
