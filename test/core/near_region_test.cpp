@@ -135,6 +135,26 @@ TEST(NearRegion, answersAreExactWhereverTheRobotGoes) {
   }
 }
 
+// The region holds all points of the robot: those beyond it are kept without a look.
+TEST(NearRegion, holdsAllPointsOfALargeLink) {
+  test::Rng rng(3);
+  Robot robot(&rng);
+  const Eigen::Vector3d size(2.0, 0.8, 0.5);
+  GeometryElement box;
+  box.shape = Box{size};
+  robot.links = {{box}};
+  robot.model = test::model_of(robot.links, 0.01);
+  robot.known = {true};
+  robot.X_FL = {Eigen::Isometry3d::Identity()};
+  Points points = room(&rng, 20000, 1.5);
+  for (int i = 0; i < 100000; ++i) {
+    Eigen::Vector3d p = 0.5 * size.cwiseProduct(test::random_vector(&rng, 1.0));
+    p[i % 3] = std::copysign(0.5 * size[i % 3], p[i % 3]);
+    points.push_back(p.cast<float>());
+  }
+  kept_points(robot, points, ingest(robot, points));
+}
+
 // What is thinned does not depend on how points are brought together.
 TEST(NearRegion, leavesTheThinnedPointsAsTheyAre) {
   test::Rng rng(7);
