@@ -6,7 +6,7 @@
 // and as many starts within the stop distance.
 //
 // Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM]
-//                    [--only "velocity filter"] [--update-doc doc/benchmark.md]
+//                    [--hidden-age S] [--only "velocity filter"] [--update-doc doc/benchmark.md]
 //        closed_loop --filter-runs 30000 [--update-doc doc/benchmark.md]
 // The second one measures how long the filter takes.
 
@@ -133,7 +133,7 @@ void tell(std::uint64_t seed, std::size_t mode, const SceneResult& result) {
 // One scene in all modes.
 SceneResult run_scene(const ist::RobotDescription& robot,
                       const std::shared_ptr<const ist::RobotModel>& model, std::uint64_t seed,
-                      double noise, const std::string& only) {
+                      double noise, double hidden_age, const std::string& only) {
   ist::sim::ClosedLoopConfig config;
   const auto nominal = [&](const Scene& scene) {
     return ist::sim::nominal_motion(robot, scene, config.controller);
@@ -166,7 +166,7 @@ SceneResult run_scene(const ist::RobotDescription& robot,
     config.leave_speed = config.controller.task_speed;
     result.starts[m] = ist::sim::run_closed_loop(robot, model, start, seed, config);
     config.rows.obstacle_speed = speed_of(rules);
-    config.rows.age = result.kind == kHidden ? 0.5 * ist::sim::HiddenRules().period : 0.0;
+    config.rows.age = result.kind == kHidden ? hidden_age : 0.0;
     config.leave_speed = 0.0;
     result.modes[m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
     tell(seed, m, result);
@@ -181,6 +181,8 @@ int main(int argc, char** argv) {
   const auto first = arguments.count("first", 1), count = arguments.count("count", 200);
   const auto threads = arguments.count("threads", 1);
   const double noise = 1e-3 * arguments.number("noise", -1.0);  // [m] negative: the cameras' own
+  // [s] What the filter is told of how long bodies hide.
+  const double hidden_age = arguments.number("hidden-age", 0.5 * ist::sim::HiddenRules().period);
   const std::string only = arguments.text("only"), document = arguments.text("update-doc");
   const auto filter_runs = arguments.count("filter-runs", 0);
   arguments.rest();
@@ -194,7 +196,7 @@ int main(int argc, char** argv) {
   const auto model = ist::build_robot_model(robot, {});
   std::vector<SceneResult> results(count);
   ist::benchmark::for_each(count, threads, [&](std::size_t i) {
-    results[i] = run_scene(robot, model, first + i, noise, only);
+    results[i] = run_scene(robot, model, first + i, noise, hidden_age, only);
   });
   std::printf("\n%s", table(results, only).c_str());
   if (document.empty()) return 0;
