@@ -34,7 +34,7 @@ class AttachedSceneTest(unittest.TestCase):
         cls.world.start_tf()
         cls.scenes = Publisher("/attached/scene", True)
         cls.scenes.send(is_diff=False)
-        source = {"type": "world", "topic": "objects", "max_objects": 10}
+        source = {"type": "world", "topic": "objects"}
         cls.node = pt.ProximityNode(
             "/attached", {"sources": {"moveit": source}, "max_distance": 1.5}, pt.urdf()
         )
@@ -214,9 +214,9 @@ class AttachedSceneTest(unittest.TestCase):
         # More than the limit: the scene is not known any more.
         attach(self.tray(), is_diff=False)
         self.nothing()
-        many = [box("part %d" % i, (0, 0, 5)) for i in range(10)]
+        many = [box("part %d" % i, (0, 0, 5)) for i in range(10000)]
         self.scenes.send(*many)
-        self.unusable("max_objects")
+        self.unusable("objects")
         self.scenes.send(is_diff=False)
         self.nothing()
 

@@ -18,7 +18,8 @@ from proximity_testing import ProximityArray
 MOST = 0.7
 # [s] that a flood lasts, and that a subscriber stands still; longer with IST_PROXIMITY_LONG_TESTS set.
 SECONDS = 60.0 if "IST_PROXIMITY_LONG_TESTS" in os.environ else 4.0
-NEIGHBOR = np.array([[0.0, 0.0, 0.48]])  # the noise filter keeps the obstacle for its sake
+# The noise filter keeps the obstacle for their sake.
+NEIGHBORS = np.array([[0.001 * i, 0.0, 0.48] for i in range(4)])
 
 
 def resident_memory(pid):
@@ -55,13 +56,13 @@ class FaultsLoadTest(faults.FaultTest):
 
     def test_ingest_slower_than_its_timeout(self):
         """A cloud whose noise filter takes longer than the timeout; the reason is not the driver."""
-        self.sensor.extra, self.cloud_timeout = NEIGHBOR, 0.1
+        self.sensor.extra, self.cloud_timeout = NEIGHBORS, 0.1
         node = self.start(
-            noise_filter={"radius": 0.2, "neighbors": 1}, cloud_timeout=self.cloud_timeout
+            noise_filter={"radius": 0.2}, cloud_timeout=self.cloud_timeout
         )
         last = self.sensor.pause(node)
         rng = np.random.default_rng(2)
-        self.sensor.extra = np.vstack([NEIGHBOR, rng.uniform(-1, 1, (300000, 3)) + [0, 0, 2.5]])
+        self.sensor.extra = np.vstack([NEIGHBORS, rng.uniform(-1, 1, (300000, 3)) + [0, 0, 2.5]])
         self.sensor.resume()
         _, reaction = self.react(
             node, last, ProximityArray.STALE_CLOUD, timeout=self.cloud_timeout
@@ -78,7 +79,7 @@ class FaultsLoadTest(faults.FaultTest):
         blamed = sum("driver stopped" in text for text in texts)
         self.assertLess(blamed, 0.2 * len(texts), texts[-1])
         self.sensor.halt()
-        self.sensor.extra = NEIGHBOR
+        self.sensor.extra = NEIGHBORS
         since = time.monotonic()
         self.sensor.resume()
         recovery = self.recover(node, since)

@@ -156,7 +156,6 @@ class PlanningSceneTest(unittest.TestCase):
                         "type": "world",
                         "topic": "objects",
                         "objects": {"post": post},
-                        "max_objects": 100,
                     },
                     "melodic": {
                         "type": "world",
@@ -267,8 +266,8 @@ class PlanningSceneTest(unittest.TestCase):
         self.at_post()
 
     def test_5_a_difference_that_is_lost_needs_a_full_scene(self):
-        self.noetic.send(*[self.noetic.box("object %d" % i, (0, 3, 0)) for i in range(101)])
-        self.node.wait_for_status(ProximityArray.NO_CLOUD, "101 objects; allowed are 100")
+        self.noetic.send(*[self.noetic.box("object %d" % i, (0, 3, 0)) for i in range(10001)])
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "10001 objects; allowed are 10000")
         self.noetic.send(self.noetic.box("(full scene)", (0, 3, 0)))
         told = self.node.wait_for_status(ProximityArray.NO_CLOUD, "a full scene")
         self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)

@@ -81,7 +81,6 @@ class ReconfigureTest(unittest.TestCase):
                 "robot_speed": 5.0,
                 "reaction_time": 2.0,
                 "stopping_time": 2.0,
-                "intrusion": 1.0,
             },
         }
         least = {"deadline": -1.0, "robot_speed": 0.001, "enabled": False}

@@ -321,7 +321,7 @@ class TrajectoryTest(unittest.TestCase):
         # The robot leaves its trajectory; its joint states end; its clouds end.
         self.at_rest = 0.2
         told = self.wait(lambda m: m.state == m.UNKNOWN, "a robot elsewhere")
-        self.assertIn("~trajectory/tolerance", told.text)
+        self.assertIn("more than 0.1 away", told.text)
         self.at_rest = 0.0
         self.wait(lambda m: m.state == m.CONTACT, "a robot that is back")
         # A message without points ends the watch.

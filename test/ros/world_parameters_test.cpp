@@ -82,12 +82,11 @@ TEST(SourceParameters, TheSearchDistanceIsThatOfTheQueries) {
   EXPECT_EQ(parse_parameters(tree, &warnings).sources.at(0).ingest.search_distance, 2.5);
 }
 
-TEST(WorldParameters, ATopicHasATimeoutAndALargestOctomap) {
+TEST(WorldParameters, ATopicHasATimeout) {
   XmlRpcValue tree = good();
   XmlRpcValue& cell = tree["sources"]["cell"];
   cell["topic"] = "parts";
   cell["timeout"] = 2.0;
-  cell["max_leaves"] = 1000;
   std::vector<std::string> warnings;
   const ServerConfig config = parse_parameters(tree, &warnings);
   EXPECT_TRUE(warnings.empty()) << warnings.front();
@@ -95,7 +94,6 @@ TEST(WorldParameters, ATopicHasATimeoutAndALargestOctomap) {
   EXPECT_EQ(source.topic, "parts");
   EXPECT_TRUE(source.world.has_topic);
   EXPECT_EQ(source.timeout, 2.0);
-  EXPECT_EQ(source.map.max_leaves, 1000U);
 }
 
 std::string error_of(const std::function<void(XmlRpcValue*)>& change) {
@@ -137,9 +135,6 @@ TEST(WorldParameters, MistakesAreNamed) {
                "wall/margin is -1 m");
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["odd"] = 3; }),
                "~sources/cell/objects/odd is 3: a dictionary is needed");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["max_objects"] = 0; }), "max_objects");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["max_objects"] = 1; }),
-               "~sources/cell/objects holds 2 objects: allowed are 1");
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["file"] = "cell.scene"; }),
                "an absolute path is needed");
   EXPECT_PRED2(has, error_of([](auto* cell) {

@@ -81,8 +81,6 @@ class WorldTest(unittest.TestCase):
                         "type": "world",
                         "topic": "parts",
                         "objects": {"stop": {"shape": "sphere", "radius": 0.1, "position": [0, 0, -3]}},
-                        "max_objects": 500,
-                        "max_triangles": 3000,
                     },
                 },
                 "links": ["ball_link"],
@@ -217,16 +215,18 @@ class WorldTest(unittest.TestCase):
         self.is_at_table()
 
     def test_5_too_many_objects(self):
-        self.send(*[box("object %d" % i, 5.0) for i in range(600)])
-        self.node.wait_for_status(ProximityArray.NO_CLOUD, "600 objects; allowed are 500")
+        self.send(*[box("object %d" % i, 5.0) for i in range(10001)])
+        self.node.wait_for_status(
+            ProximityArray.NO_CLOUD, "10001 objects; allowed are 10000"
+        )
         self.send(replace_all=True)
         self.is_at_table()
         # What exceeds a limit is refused as a whole, also where it is to replace all objects: the
         # part of before stays.
         self.send(box("part", 0.0, 0.3))
         self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the part")
-        self.send(*[box("object %d" % i, 5.0) for i in range(300)], replace_all=True)
-        self.node.wait_for_status(ProximityArray.NO_CLOUD, "3600 triangles; allowed are 3000")
+        self.send(*[box("object %d" % i, 5.0) for i in range(10000)], replace_all=True)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "would hold 10001 objects")
         self.send()
         self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the part of before")
         self.send(replace_all=True)

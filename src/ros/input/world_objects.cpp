@@ -45,8 +45,7 @@ void WorldSource::apply(const ist_proximity::WorldObjects& message) {
   if (message.objects.size() > limit) {
     note_fault(fault_of(Kind::kMessage),
                "a message holds " + std::to_string(message.objects.size()) +
-                   " objects; allowed are " + std::to_string(limit) + " (~sources/" + config_.name +
-                   "/max_objects): it is not used");
+                   " objects; allowed are " + std::to_string(limit) + ": it is not used");
     return show_faults();
   }
   faults_.erase(fault_of(Kind::kMessage));

@@ -71,9 +71,9 @@ void WorldSource::note_fault(const WorldFaultKey& key, const std::string& fault)
   // Names that are never sent again would fill the memory.
   const bool is_named = key.first == Kind::kObject || key.first == Kind::kClash;
   if (is_named && faults_.size() >= config_.world.limits.max_objects && faults_.count(key) == 0) {
-    faults_[fault_of(Kind::kMany)] = "more objects than max_objects, which is " +
+    faults_[fault_of(Kind::kMany)] = "more than " +
                                      std::to_string(config_.world.limits.max_objects) +
-                                     ", could not be used; replace all of them";
+                                     " objects could not be used; replace all of them";
     return;
   }
   faults_[key] = fault;

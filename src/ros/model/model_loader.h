@@ -52,7 +52,7 @@ class ModelLoader {
   /// Makes an object a part of its link, or removes it again. The old model stays in use until the
   /// new one replaces it, which happens before the function returns. Attached objects survive
   /// reload() as long as their link does. attach() is cancelled by detach() of the same name, by
-  /// reload(), by end_changes() and after ~attach/max_time. detach() works at any time: a model
+  /// reload(), by end_changes() and after 30 s. detach() works at any time: a model
   /// that is being loaded is loaded again without the object.
   /// @returns empty on success, else the reason; then nothing has changed
   std::string attach(const std::string& name, const ObjectReader& read);
@@ -71,7 +71,6 @@ class ModelLoader {
   std::string attach_read(const std::string& name, const ObjectReader& read);
   std::string detach_from(const std::shared_ptr<const ModelState>& state, const std::string& name);
   std::optional<std::string> detach_while_loading(const std::string& name);
-  void begin_deadline();
   std::string change_objects(const std::shared_ptr<const ModelState>& state,
                              std::vector<AttachedObject> objects, const std::string& link);
   void begin_change(const std::string& name);

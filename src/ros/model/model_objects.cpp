@@ -12,6 +12,7 @@ namespace ist {
 namespace {
 
 constexpr std::size_t kMostAttached = 100;
+constexpr std::chrono::seconds kAttachTime(30);  // reading and packing included
 
 std::string not_ready(const ModelState& state) {
   return "the robot's model is not ready yet: " + state.problem;
@@ -44,27 +45,21 @@ std::string ModelLoader::why_cancelled() const {
   if (stop_ || changes_ended_) return "the node is shutting down";
   if (change_revoked_) return "the object was detached while it was being attached";
   if (reload_) return "the robot's model has been loaded again meanwhile; try again";
-  return format_text("it takes longer than %g s (~attach/max_time)", config_.attach_max_time) +
-         "; use a simpler mesh, a primitive shape, or raise ~packing/max_error";
+  return "it takes longer than " + std::to_string(kAttachTime.count()) +
+         " s; use a simpler mesh, a primitive shape, or raise ~packing/max_error";
 }
 
-/// Makes `name` the object at work, or none where it is empty.
+/// Makes `name` the object at work, or none where it is empty. The caller holds change_mutex_.
 void ModelLoader::begin_change(const std::string& name) {
   const std::lock_guard<std::mutex> lock(mutex_);
   changing_ = name;
   change_revoked_ = false;
-}
-
-void ModelLoader::begin_deadline() {
-  const std::chrono::duration<double> allowed(config_.attach_max_time);
-  change_deadline_ = std::chrono::steady_clock::now() +
-                     std::chrono::duration_cast<std::chrono::steady_clock::duration>(allowed);
+  change_deadline_ = std::chrono::steady_clock::now() + kAttachTime;
 }
 
 std::string ModelLoader::attach(const std::string& name, const ObjectReader& read) {
   const std::lock_guard<std::mutex> lock(change_mutex_);
   begin_change(name);
-  begin_deadline();
   std::string problem;
   try {
     problem = attach_read(name, read);
@@ -104,7 +99,6 @@ std::string ModelLoader::detach(const std::string& name) {
   }
   const std::lock_guard<std::mutex> lock(change_mutex_);
   begin_change("");
-  begin_deadline();
   for (;;) {
     const auto state = this->state();
     if (state->is_ready()) return detach_from(state, name);

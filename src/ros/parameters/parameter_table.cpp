@@ -20,8 +20,14 @@ namespace {
 // - ViewFilterConfig: errors of a calibrated camera; the filter finds the rest, and tells doubts.
 // - MemoryConfig::max_range: farther rays cost time, and reach no arm.
 // - IngestConfig::sensor_range and kMinMeasured tell a broken sensor, not how good it is.
-// - IngestConfig::max_points and OctreeLimits::max_bytes are more than any sensor or map of
-//   max_leaves has; they keep a broken message from taking the memory.
+// - IngestConfig::max_points, OctreeLimits and WorldLimits are more than any sensor, map or cell
+// has;
+//   they keep a broken message from taking the memory.
+// - kAttachTime and SelfCollisionConfig::kRate are what a pick and a controller need.
+// - TrajectoryConfig::tolerance: a robot that is farther off does not follow.
+// - SeparationConfig::intrusion: ~query/margin is taken off the same bounds.
+// - NoiseFilterConfig::neighbors: a larger radius stands for fewer of them.
+// - The unit of a depth image is that of REP 118, and its CameraInfo is beside it: remap either.
 // - ExtentConfig::calibration_angle is a sensor model's own; a mounting's error is calibration.
 // - PenetrationConfig::stiffness scales all wrenches alike, as a reader can.
 // - kMostAttached: each object is packed, and measured by every query.
@@ -107,20 +113,15 @@ std::vector<Parameter> answer_parameters(ServerConfig* config) {
           "Links with a contact wrench; auto: those within repulsion/influence_distance so far."),
       row("self_collision/enabled", &self.enabled,
           "Distances from link to link, on ~self_proximity."),
-      row("self_collision/rate", &self.rate, {"Hz", 0.01, 1000.0}, "How often they come."),
       row("self_collision/ignore", &self.ignore,
           "Pairs to leave out, [[a, b], [c, d]], besides neighbours and what an SRDF disables."),
       row("self_collision/in_minimum", &self.in_minimum,
           "They count in ~min_distance, ~speed_scale and ~joint_repulsion."),
-      row("attach/max_time", &config->attach_max_time, Range::positive("s", 3600.0),
-          "Reading and packing an object may take no longer."),
       row("joint_deceleration/default", &config->deceleration.other,
           Range::non_negative("rad/s^2 or m/s^2", 1e3),
           "With how much joints brake at least; robot_future follows. 0: not known. Or by joint: "
           "{default: 5, joint_1: 3}.",
           Parameter::kStartOnly, true),
-      row("trajectory/tolerance", &config->trajectory.tolerance, Range::positive("rad or m", 10.0),
-          "Where a joint is farther from ~trajectory, what is left of that is UNKNOWN."),
       row("trajectory/obstacle_speed", &config->trajectory.obstacle_speed,
           Range::non_negative("m/s", 100.0), "Obstacles may come this fast; 0: they stand still."),
       row("trajectory/cancel_topic", &config->trajectory.cancel_topic,
@@ -157,8 +158,6 @@ std::vector<Parameter> speed_scale_parameters(ServerConfig* config) {
           "Time from the scale to drives that brake.", 2.0),
       row("speed_scale/separation/stopping_time", &separation.stopping_time, time,
           "Time in which the robot stops from robot_speed.", 2.0),
-      row("speed_scale/separation/intrusion", &separation.intrusion, kLength,
-          "Reach past the sensor unseen, and uncertainty besides query/margin.", 1.0),
   };
   for (LinkSpeedDistances& link : speed.links) {
     const std::string at = "speed_scale/links/" + link.link + "/";
@@ -230,9 +229,8 @@ std::vector<Parameter> image_parameters(const std::string& at, SourceConfig* sou
   SourceMemoryConfig& memory = source->memory;
   return {
       row(at + "noise_filter/radius", &source->noise.radius, kShort,
-          "Drop points of clouds and images with few neighbors in this distance; 0: none."),
-      row(at + "noise_filter/neighbors", &source->noise.neighbors, {"", 1.0, 1000.0},
-          "Neighbors that a point needs."),
+          "Drop points of clouds and images with fewer than 4 neighbors in this distance; 0: "
+          "none."),
       row(at + "memory/enabled", &memory.enabled,
           "What left the view of a cloud or image stays as boxes of a source NAME/memory."),
       row(at + "memory/decay", &memory.map.decay, kTime,
@@ -255,8 +253,6 @@ std::vector<Parameter> map_parameters(const std::string& at, SourceConfig* sourc
       row(at + "noise/a", &extent.noise_constant, kShort),
       row(at + "noise/calibration", &extent.calibration, kShort),
       row(at + "latency", &extent.latency, Range::non_negative("s", 10.0)),
-      row(at + "max_leaves", &source->map.max_leaves, {"", 1.0, 5e7},
-          "A map of more occupied leaves is refused."),
   };
 }
 
@@ -276,12 +272,6 @@ std::vector<Parameter> world_parameters(const std::string& at, SourceConfig* sou
       row(at + "margin", &world.margin, kMargin, "Of objects that state none."),
       row(at + "allowed_contacts", &world.allowed_contacts,
           "Pairs of a link and an object that may touch, [[base_link, table]]."),
-      row(at + "max_objects", &world.limits.max_objects, {"", 1.0, 1e6},
-          "More, or more shapes of all objects, are refused."),
-      row(at + "max_triangles", &world.limits.max_triangles, {"", 1.0, 1e8},
-          "More, of all objects, are refused."),
-      row(at + "max_leaves", &source->map.max_leaves, {"", 1.0, 5e7},
-          "And of octomaps on the topic."),
   };
 }
 
@@ -318,13 +308,6 @@ std::vector<Parameter> source_parameters(const std::string& at, SourceConfig* so
         row(at + "timeout", &source->timeout, kTime, timeout_help),
         row(at + "required", &source->required,
             "false: its absence shows in its own status only, while another source measures.")};
-  }
-  if (type == SourceType::kDepthImage) {
-    append({row(at + "camera_info", &source->camera_info,
-                "Topic of its sensor_msgs/CameraInfo. Default: camera_info beside topic."),
-            row(at + "depth_scale", &source->depth_unit, {"m", 0.0, 1.0},
-                "Of a number of 1; 0: that of the encoding.")},
-           &table);
   }
   if (type == SourceType::kMap) {
     append(map_parameters(at, source), &table);

@@ -32,8 +32,8 @@ enum class PoseSourceKind { kTf, kJointStates };
 
 /// Parameters of ~self_proximity, which measures link against link.
 struct SelfCollisionConfig {
+  static constexpr double kRate = 50.0;  ///< [Hz] of ~self_proximity
   bool enabled = false;
-  double rate = 50.0;  ///< [Hz] of ~self_proximity; > 0
   std::vector<std::pair<std::string, std::string>>
       ignore;  ///< pairs of links to leave out, besides adjacent ones
   /// Its links count in ~min_distance, ~speed_scale and ~joint_repulsion.
@@ -103,7 +103,6 @@ struct ServerConfig : LiveConfig {
   bool self_filter_all = false;
   ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   SelfCollisionConfig self_collision;
-  double attach_max_time = 30.0;  ///< [s] of ~attach_object, reading and packing included; > 0
   JointDeceleration deceleration;
   TrajectoryConfig trajectory;
   /// Links that do not count in ~min_distance, ~speed_scale and the summary of the diagnostics.

@@ -62,9 +62,9 @@ void read_object(ParameterReader* reader, const std::string& at, bool has_margin
 void read_objects(ParameterReader* reader, const std::string& at, WorldConfig* world) {
   const std::vector<std::string> names = reader->children(at + "objects");
   if (names.size() > world->limits.max_objects) {
-    reader->add_error(at + "objects",
-                      "holds " + std::to_string(names.size()) + " objects: allowed are " +
-                          std::to_string(world->limits.max_objects) + " (max_objects)");
+    reader->add_error(at + "objects", "holds " + std::to_string(names.size()) +
+                                          " objects: allowed are " +
+                                          std::to_string(world->limits.max_objects));
     return;
   }
   for (const std::string& name : names) {

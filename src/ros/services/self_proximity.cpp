@@ -52,7 +52,7 @@ void SelfProximity::publish(const ProximityArrayConstPtr& message) {
 void SelfProximity::run() {
   name_thread("ist self");
   const auto period = std::chrono::duration_cast<Clock::duration>(
-      std::chrono::duration<double>(1.0 / config_.self_collision.rate));
+      std::chrono::duration<double>(1.0 / SelfCollisionConfig::kRate));
   Clock::time_point next = Clock::now();
   while (true) {
     next = std::max(next + period, Clock::now());
@@ -196,7 +196,7 @@ void SelfProximity::publish_once() {
   last_now_ = now;
   const auto message = boost::make_shared<ProximityArray>();
   LiveConfig live = live_();
-  live.query.deadline = deadline_of(live.query.deadline, 1.0 / config_.self_collision.rate);
+  live.query.deadline = deadline_of(live.query.deadline, 1.0 / SelfCollisionConfig::kRate);
   StatusInput input;
   input.clock_runs = !now.isZero();
   input.findings = model_findings(*model_);

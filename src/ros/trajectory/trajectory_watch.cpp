@@ -140,7 +140,7 @@ std::string TrajectoryWatch::why_elsewhere(double time) const {
     if (std::abs(off) <= config_.trajectory.tolerance) continue;
     return format_text(
         "the robot does not follow the trajectory: joint '%s' is at %.3f and should be at %.3f, "
-        "which is more than ~trajectory/tolerance (%g)",
+        "more than %g away",
         name.c_str(), q_now, q[joint], config_.trajectory.tolerance);
   }
   return "";
