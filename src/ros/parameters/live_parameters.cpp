@@ -6,7 +6,6 @@
 #include <ros/this_node.h>
 
 #include <algorithm>
-#include <functional>
 #include <sstream>
 
 #include "ros/common/publish.h"
@@ -21,10 +20,8 @@ using dynamic_reconfigure::ConfigDescription;
 using dynamic_reconfigure::Reconfigure;
 using XmlRpc::XmlRpcValue;
 
-constexpr char kOnlyGroup[] = "Default";
-constexpr const char* kGroups[] = {"query", "repulsion", "speed_scale", "speed_scale/separation"};
 constexpr char kKept[] = "the last valid ~query, ~repulsion and ~speed_scale stay in use: ";
-constexpr std::chrono::seconds kRepeatLog(30), kRepeatRefusal(5), kPatience(3);
+constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
 
 /// A group is a dictionary, without the dictionaries in it.
 std::vector<Parameter> rows_of(const std::string& group, ServerConfig* config) {
@@ -37,41 +34,36 @@ std::vector<Parameter> rows_of(const std::string& group, ServerConfig* config) {
 
 std::string name_in_group(const Parameter& row) { return row.name.substr(row.name.rfind('/') + 1); }
 
-/// One number of each row.
-Config config_of(const std::vector<Parameter>& rows,
-                 const std::function<double(const Parameter&)>& number) {
-  Config config;
-  for (const Parameter& row : rows) {
-    if (row.is_bool()) {
-      config.bools.emplace_back();
-      config.bools.back().name = name_in_group(row);
-      config.bools.back().value = number(row) != 0.0;
-    } else {
-      config.doubles.emplace_back();
-      config.doubles.back().name = name_in_group(row);
-      config.doubles.back().value = number(row);
-    }
-  }
-  config.groups.resize(1);
-  config.groups[0].name = kOnlyGroup;
-  config.groups[0].state = true;
-  return config;
+void add_number(const Parameter& row, double number, Config* config) {
+  const auto add = [&row, number](auto* list) {
+    list->emplace_back();
+    list->back().name = name_in_group(row);
+    list->back().value = static_cast<decltype(list->back().value)>(number);
+  };
+  row.is_bool() ? add(&config->bools) : add(&config->doubles);
+  config->groups.resize(1);
+  config->groups[0].name = "Default";
+  config->groups[0].state = true;
 }
 
-double number_of(const Parameter& row) { return row.number(); }
+Config config_of(const std::vector<Parameter>& rows) {
+  Config config;
+  for (const Parameter& row : rows) add_number(row, row.number(), &config);
+  return config;
+}
 
 /// A value that is set is not cut off.
 ConfigDescription describe(const std::vector<Parameter>& defaults,
                            const std::vector<Parameter>& live, double max_distance) {
   ConfigDescription all;
-  all.dflt = config_of(defaults, number_of);
-  all.min = config_of(defaults, [](const Parameter& row) { return row.range.min; });
-  all.max = config_of(live, [max_distance](const Parameter& row) {
-    return std::max(row.number(), row.slider > 0.0 ? row.slider : max_distance);
-  });
   all.groups.resize(1);
-  all.groups[0].name = kOnlyGroup;
-  for (const Parameter& row : defaults) {
+  all.groups[0].name = "Default";
+  for (std::size_t i = 0; i < defaults.size(); ++i) {
+    const Parameter& row = defaults[i];
+    const double end = row.slider > 0.0 ? row.slider : max_distance;
+    add_number(row, row.number(), &all.dflt);
+    add_number(row, row.range.min, &all.min);
+    add_number(row, std::max(live[i].number(), end), &all.max);
     dynamic_reconfigure::ParamDescription one;
     one.name = name_in_group(row);
     one.type = row.is_bool() ? "bool" : "double";
@@ -110,17 +102,15 @@ LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerCo
   defaults = parse_live(XmlRpcValue(), defaults).config;  // the influence distance fits, too
   {
     const std::lock_guard<std::mutex> lock(change_mutex_);
-    for (const char* name : kGroups) advertise(name, &defaults);
+    for (Group& group : groups_) advertise(&defaults, &group);
   }
   read_again();
   timer_ = private_nh_.createSteadyTimer(ros::WallDuration(1.0),
                                          [this](const ros::SteadyTimerEvent&) { read_again(); });
 }
 
-void LiveParameters::advertise(const std::string& name, ServerConfig* defaults) {
-  groups_.push_back(std::make_unique<Group>());
-  Group* group = groups_.back().get();
-  group->name = name;
+void LiveParameters::advertise(ServerConfig* defaults, Group* group) {
+  const std::string name = group->name;
   ros::NodeHandle nh(private_nh_, name);
   group->descriptions = nh.advertise<ConfigDescription>("parameter_descriptions", 1, true);
   publish_message(group->descriptions, describe(rows_of(name, defaults), rows_of(name, &live_),
@@ -230,18 +220,13 @@ std::string LiveParameters::lost_names(const std::set<std::string>& found) const
 /// The caller holds change_mutex_.
 void LiveParameters::set_problem(const std::string& problem) {
   const std::string text = problem.empty() ? "" : kKept + problem;
+  std::string before = text;
   {
     const std::lock_guard<std::mutex> lock(live_mutex_);
-    problem_ = text;
+    before.swap(problem_);
   }
-  const auto now = Clock::now();
-  if (text.empty()) {
-    if (!logged_problem_.empty()) ROS_INFO("the live parameters are those of the server again");
-  } else if (text != logged_problem_ || now - logged_time_ > kRepeatLog) {
-    ROS_WARN_STREAM(text);
-    logged_time_ = now;
-  }
-  logged_problem_ = text;
+  if (!text.empty()) return log(text);
+  if (!before.empty()) ROS_INFO("the live parameters are those of the server again");
 }
 
 /// The caller holds change_mutex_.
@@ -261,12 +246,12 @@ bool LiveParameters::set(Group* group, const Config& wanted, Config* answer) {
   for (const auto& one : wanted.bools) change[one.name] = XmlRpcValue(one.value != 0);
   for (const auto& one : wanted.strs) change[one.name] = one.value;
   ServerConfig live = config();
-  const std::vector<Parameter> rows = rows_of(group->name, &live);
+  std::set<std::string> names;
+  for (const Parameter& row : rows_of(group->name, &live)) names.insert(name_in_group(row));
   for (const auto& one : change) {
-    const auto is_this = [&one](const Parameter& row) { return name_in_group(row) == one.first; };
-    if (std::any_of(rows.begin(), rows.end(), is_this)) continue;
-    log_refusal("a request to " + private_nh_.getNamespace() + "/" + group->name +
-                "/set_parameters is refused: '" + one.first + "' is none of its parameters");
+    if (names.count(one.first) > 0) continue;
+    log("a request to " + private_nh_.getNamespace() + "/" + group->name +
+        "/set_parameters is refused: '" + one.first + "' is none of its parameters");
     return false;
   }
   const bool answered = read_server() && apply(group->name, change);
@@ -286,7 +271,7 @@ bool LiveParameters::apply(const std::string& group, const Values& change) {
   for (const auto& [name, value] : change) (*members)[name] = value;
   const LiveReading reading = parse_live(tree, config());
   if (!reading.errors.empty()) {
-    log_refusal(kKept + join(reading.errors, "; "));
+    log(kKept + join(reading.errors, "; "));
     return true;
   }
   for (const auto& [name, value] : change) {
@@ -299,22 +284,22 @@ bool LiveParameters::apply(const std::string& group, const Values& change) {
   return true;
 }
 
-/// The response has no place for a reason. The caller holds change_mutex_.
-void LiveParameters::log_refusal(const std::string& reason) {
-  const auto now = Clock::now();
-  if (reason == logged_refusal_ && now - refusal_time_ < kRepeatRefusal) return;
-  logged_refusal_ = reason;
-  refusal_time_ = now;
-  ROS_WARN_STREAM(reason);
+/// The response has no place for the reason of a refusal. The caller holds change_mutex_.
+void LiveParameters::log(const std::string& text) {
+  const Clock::time_point now = Clock::now();
+  if (text == logged_ && now - logged_time_ < kRepeatLog) return;
+  logged_ = text;
+  logged_time_ = now;
+  ROS_WARN_STREAM(text);
 }
 
 void LiveParameters::publish_updates() {
   ServerConfig live = config();
-  for (const auto& group : groups_) {
-    const Config now = config_of(rows_of(group->name, &live), number_of);
-    if (now == group->published) continue;
-    group->published = now;
-    publish_message(group->updates, now);
+  for (Group& group : groups_) {
+    const Config now = config_of(rows_of(group.name, &live));
+    if (now == group.published) continue;
+    group.published = now;
+    publish_message(group.updates, now);
   }
 }
 

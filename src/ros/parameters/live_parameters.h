@@ -7,12 +7,10 @@
 
 #include <chrono>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "ros/parameters/parameters.h"
 
@@ -28,9 +26,8 @@ namespace ist {
 /// problem() says so. A request through dynamic_reconfigure takes effect entirely or not at all;
 /// one that names anything else than the group's parameters fails.
 ///
-/// dynamic_reconfigure::Server asks for a type with thirteen members for each group, the ranges
-/// among the static ones, and gives two publishers and a service for it. It also takes requests
-/// that cannot be read, and first publishes values that are not in use.
+/// dynamic_reconfigure::Server takes requests that cannot be read, and first publishes values that
+/// are not in use.
 ///
 /// Thread safe.
 class LiveParameters {
@@ -51,13 +48,13 @@ class LiveParameters {
   using Values = std::map<std::string, XmlRpc::XmlRpcValue>;
   /// The topics and the service of one dynamic_reconfigure server.
   struct Group {
-    std::string name;
-    ros::Publisher descriptions, updates;
-    ros::ServiceServer service;
-    dynamic_reconfigure::Config published;
+    const char* name;
+    ros::Publisher descriptions = {}, updates = {};
+    ros::ServiceServer service = {};
+    dynamic_reconfigure::Config published = {};
   };
 
-  void advertise(const std::string& name, ServerConfig* defaults);
+  void advertise(ServerConfig* defaults, Group* group);
   void read_again();
   bool read_server();
   bool set(Group* group, const dynamic_reconfigure::Config& wanted,
@@ -68,19 +65,17 @@ class LiveParameters {
   void note_startup_changes(const XmlRpc::XmlRpcValue& tree);
   std::string lost_names(const std::set<std::string>& found) const;
   void set_problem(const std::string& problem);
-  void log_refusal(const std::string& reason);
+  void log(const std::string& text);
   void publish_updates();
 
   ros::NodeHandle private_nh_;
   std::mutex change_mutex_;  ///< held from reading the parameter server to the end of the change
-  std::vector<std::unique_ptr<Group>> groups_;
+  Group groups_[4] = {{"query"}, {"repulsion"}, {"speed_scale"}, {"speed_scale/separation"}};
   std::set<std::string> configured_;  ///< live parameters that have been on the parameter server
   /// What is read at the start only, as it was then; empty until it is known.
   std::optional<Values> at_start_;
-  std::string logged_problem_;
+  std::string logged_;
   Clock::time_point logged_time_;
-  std::string logged_refusal_;
-  Clock::time_point refusal_time_;
 
   mutable std::mutex live_mutex_;  ///< guards the members below
   ServerConfig live_;

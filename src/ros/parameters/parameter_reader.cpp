@@ -267,6 +267,13 @@ std::vector<std::string> ParameterReader::children(const std::string& name) {
   return names;
 }
 
+void ParameterReader::read_by_name(const std::string& name, const Range& range,
+                                   std::map<std::string, double>* numbers) {
+  for (const std::string& child : children(name)) {
+    if (child != "default") read({name + "/" + child, &(*numbers)[child], range});
+  }
+}
+
 std::vector<std::string> ParameterReader::unknown() const {
   std::vector<std::string> sentences;
   for (const auto& [leaf, value] : leaves_of(tree_)) {

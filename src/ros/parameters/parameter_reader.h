@@ -110,6 +110,10 @@ class ParameterReader {
   void read(const Parameter& parameter);
   void read_all(const std::vector<Parameter>& parameters);
 
+  /// Reads the numbers of a dictionary whose names are not known before, `default` aside.
+  void read_by_name(const std::string& name, const Range& range,
+                    std::map<std::string, double>* numbers);
+
   bool has(const std::string& name) const { return find(name) != nullptr; }
   /// @returns TypeInvalid where it is absent
   XmlRpc::XmlRpcValue::Type type(const std::string& name) const;

@@ -11,7 +11,6 @@
 #include "ros/common/text.h"
 #include "ros/parameters/parameter_reader.h"
 #include "ros/parameters/parameter_table.h"
-#include "ros/parameters/source_parameters.h"
 
 namespace ist {
 namespace {
@@ -46,14 +45,6 @@ void find_links_with_distances(ParameterReader* reader, SpeedScaleConfig* config
     const std::string at = "speed_scale/links/" + name;
     reader->children(at);  // adds an error unless it is a dictionary
     config->links.push_back({name, unread(at + "/stop_distance"), unread(at + "/free_distance")});
-  }
-}
-
-void read_decelerations(ParameterReader* reader, JointDeceleration* deceleration) {
-  for (const std::string& joint : reader->children("joint_deceleration")) {
-    if (joint == "default") continue;
-    reader->read({"joint_deceleration/" + joint, &deceleration->by_joint[joint],
-                  Range::non_negative("rad/s^2 or m/s^2", 1e3)});
   }
 }
 
@@ -139,7 +130,8 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   config.model.cache_directory = default_cache_directory();
   find_links_with_distances(&reader, &config.speed_scale);
   reader.read_all(node_parameters(&config));
-  read_decelerations(&reader, &config.deceleration);
+  reader.read_by_name("joint_deceleration", Range::non_negative("rad/s^2 or m/s^2", 1e3),
+                      &config.deceleration.by_joint);
   check_model(&reader, config);
   fit_speed_scale(reader, config.query.max_distance, &config.speed_scale);
   check_speed_scale(&reader, config);

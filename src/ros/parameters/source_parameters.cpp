@@ -1,4 +1,4 @@
-#include "ros/parameters/source_parameters.h"
+#include "ros/parameters/parameter_table.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,6 @@
 
 #include "internal/geometry/numbers.h"
 #include "ros/common/text.h"
-#include "ros/parameters/parameter_table.h"
 
 namespace ist {
 namespace {
@@ -25,10 +24,7 @@ constexpr const char* kNouns[] = {"cloud", "image", "scan", "map", "world"};
 void read_paddings(ParameterReader* reader, const std::string& at, SourceConfig* source) {
   const std::string name = at + "self_filter_padding";
   if (reader->has(name)) source->link_paddings.clear();
-  for (const std::string& link : reader->children(name)) {
-    if (link == "default") continue;
-    reader->read({name + "/" + link, &source->link_paddings[link], Range::non_negative("m", 1.0)});
-  }
+  reader->read_by_name(name, Range::non_negative("m", 1.0), &source->link_paddings);
   double* const largest = &source->ingest.self_filter_padding;
   *largest = source->other_padding;
   for (const auto& [link, padding] : source->link_paddings) *largest = std::max(*largest, padding);

@@ -5,7 +5,6 @@
 #include "ist_proximity/proximity/world_file.h"
 #include "ros/common/text.h"
 #include "ros/parameters/parameter_table.h"
-#include "ros/parameters/source_parameters.h"
 
 namespace ist {
 namespace {

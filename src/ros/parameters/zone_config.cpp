@@ -1,13 +1,12 @@
 #include "ros/parameters/zone_config.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <variant>
 
 #include "internal/geometry/limits.h"
 #include "ros/common/text.h"
-#include "ros/parameters/source_parameters.h"
+#include "ros/parameters/parameter_table.h"
 
 namespace ist {
 namespace {
