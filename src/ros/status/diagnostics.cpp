@@ -36,102 +36,93 @@ std::string doubt_of_self_filter(const SourceReport& source) {
   return "";
 }
 
-void add_source_counts(const SourceReport& source, double rate, double now,
-                       DiagnosticStatus* status) {
-  add_value("topic", source.topic, status);
-  add_value("required", source.required ? "true" : "false", status);
+void add_source_counts(const SourceReport& source, double rate, double now, const Values& add) {
+  add("topic", source.topic);
+  add("required", source.required ? "true" : "false");
   if (source.is_memory) {
     if (source.has_snapshot) {
-      add_value("age", format_text("%.3f s", now - source.counts_from.toSec()), status);
-      add_value("boxes in use", source.counts.used, status);
-      add_value("time to remember", milliseconds(source.ingest_time), status);
+      add("age", format_text("%.3f s", now - source.counts_from.toSec()));
+      add("boxes in use", source.counts.used);
+      add("time to remember", milliseconds(source.ingest_time));
     }
-    add_value("voxels occupied", source.memory_occupied, status);
-    add_value("voxels in memory", source.memory_voxels, status);
+    add("voxels occupied", source.memory_occupied);
+    add("voxels in memory", source.memory_voxels);
     return;
   }
-  add_value("publishers", source.publishers, status);
-  add_value("messages received", source.messages, status);
-  if (!source.is_file) add_value("rate", format_text("%.1f Hz", rate), status);
-  if (source.ahead > 0.0) add_value("stamps ahead", milliseconds(source.ahead), status);
-  add_value("dropped: unusable", source.unusable, status);
-  add_value("dropped: out of order", source.out_of_order, status);
-  add_value("new starts: stamps went back", source.restarts, status);
-  add_value("dropped: overtaken by a newer one", source.overtaken, status);
-  add_value("shown on ~filtered_cloud", source.shown, status);
+  add("publishers", source.publishers);
+  add("messages received", source.messages);
+  if (!source.is_file) add("rate", format_text("%.1f Hz", rate));
+  if (source.ahead > 0.0) add("stamps ahead", milliseconds(source.ahead));
+  add("dropped: unusable", source.unusable);
+  add("dropped: out of order", source.out_of_order);
+  add("new starts: stamps went back", source.restarts);
+  add("dropped: overtaken by a newer one", source.overtaken);
+  add("shown on ~filtered_cloud", source.shown);
   if (!std::isnan(source.blind_skin)) {
-    add_value("blind skin about the robot", millimetres(source.blind_skin), status);
+    add("blind skin about the robot", millimetres(source.blind_skin));
   }
   if (source.has_snapshot) {
-    if (!source.is_file)
-      add_value("age", format_text("%.3f s", now - source.counts_from.toSec()), status);
-    add_value("points received", source.counts.received, status);
-    add_value("points used", source.counts.used, status);
-    add_value("points on the robot", source.counts.on_robot, status);
-    add_value("points in zones", source.counts.in_zones, status);
-    add_value("points out of range", source.counts.out_of_range, status);
-    add_value("points outside the region of interest", source.counts.outside_region, status);
-    if (source.counts.noise > 0) add_value("points taken for noise", source.counts.noise, status);
-    add_value("points NaN", source.counts.not_a_number, status);
-    add_value("points infinite", source.counts.infinite, status);
-    add_value("points too near", source.counts.too_near, status);
-    add_value("points not believed", source.counts.not_believed, status);
-    add_value("identical points", source.counts.at_one_place, status);
-    add_value("share measured", format_text("%.3f", source.counts.measured_share()), status);
-    add_value("time to ingest", milliseconds(source.ingest_time), status);
-    add_value("time of the first answer with it", milliseconds(source.warm_up_time), status);
-    add_value("memory of the cloud's index",
-              format_text("%.1f MB", 1e-6 * static_cast<double>(source.snapshot_memory)), status);
+    if (!source.is_file) add("age", format_text("%.3f s", now - source.counts_from.toSec()));
+    add("points received", source.counts.received);
+    add("points used", source.counts.used);
+    add("points on the robot", source.counts.on_robot);
+    add("points in zones", source.counts.in_zones);
+    add("points out of range", source.counts.out_of_range);
+    add("points outside the region of interest", source.counts.outside_region);
+    if (source.counts.noise > 0) add("points taken for noise", source.counts.noise);
+    add("points NaN", source.counts.not_a_number);
+    add("points infinite", source.counts.infinite);
+    add("points too near", source.counts.too_near);
+    add("points not believed", source.counts.not_believed);
+    add("identical points", source.counts.at_one_place);
+    add("share measured", format_text("%.3f", source.counts.measured_share()));
+    add("time to ingest", milliseconds(source.ingest_time));
+    add("time of the first answer with it", milliseconds(source.warm_up_time));
+    add("memory of the cloud's index",
+        format_text("%.1f MB", 1e-6 * static_cast<double>(source.snapshot_memory)));
   }
 }
 
 /// Adds what the self-filter by view found.
-void add_view(const SourceReport& source, DiagnosticStatus* status) {
+void add_view(const SourceReport& source, const Values& add) {
   const bool is_used = source.has_snapshot && source.view.is_used;
-  add_value("self-filter",
-            !source.by_view ? "padding"
-            : is_used       ? "view"
-                            : "padding, not an image",
-            status);
+  add("self-filter", !source.by_view ? "padding" : is_used ? "view" : "padding, not an image");
   if (!is_used) return;
   const ViewReport& view = source.view;
-  add_value("correction of the sensor's pose on the robot", millimetres(view.offset), status);
-  add_value("correction of the sensor's orientation",
-            format_text("%.2f deg", view.angle * 180.0 / 3.14159265358979323846), status);
-  add_value("uncertainty of the corrected pose", millimetres(view.uncertainty), status);
-  add_value("residual of the robot's surface", millimetres(view.residual), status);
+  add("correction of the sensor's pose on the robot", millimetres(view.offset));
+  add("correction of the sensor's orientation",
+      format_text("%.2f deg", view.angle * 180.0 / 3.14159265358979323846));
+  add("uncertainty of the corrected pose", millimetres(view.uncertainty));
+  add("residual of the robot's surface", millimetres(view.residual));
   for (std::size_t i = 0; i < view.links.size() && i < source.view_links.size(); ++i) {
     const LinkView& link = view.links[i];
-    add_value("blind skin of " + source.view_links[i], millimetres(link.blind_skin), status);
-    add_value("unexplained points in the skin of " + source.view_links[i], link.unexplained,
-              status);
+    add("blind skin of " + source.view_links[i], millimetres(link.blind_skin));
+    add("unexplained points in the skin of " + source.view_links[i], link.unexplained);
   }
 }
 
 /// Adds the deadline, and the worst that it has cost since the last diagnostics.
-void add_deadline(const CycleReport& report, DiagnosticStatus* status) {
+void add_deadline(const CycleReport& report, const Values& add) {
   const DeadlineCost& worst = report.worst_deadline;
-  add_value("deadline", report.deadline > 0.0 ? milliseconds(report.deadline) : "none", status);
-  add_value("deadlines missed", report.deadlines_missed, status);
-  add_value("links unfinished, most of a cycle", worst.unfinished, status);
-  add_value("widest bounds of unfinished links", millimetres(worst.widest), status);
-  add_value("links with unblended repulsion, most of a cycle", worst.unblended, status);
-  add_value("links without penetration, most of a cycle", worst.no_penetration, status);
+  add("deadline", report.deadline > 0.0 ? milliseconds(report.deadline) : "none");
+  add("deadlines missed", report.deadlines_missed);
+  add("links unfinished, most of a cycle", worst.unfinished);
+  add("widest bounds of unfinished links", millimetres(worst.widest));
+  add("links with unblended repulsion, most of a cycle", worst.unblended);
+  add("links without penetration, most of a cycle", worst.no_penetration);
 }
 
-void add_parts(const CycleReport& report, DiagnosticStatus* status) {
+void add_parts(const CycleReport& report, const Values& add) {
   const std::array<const char*, kCycleParts> names = {"poses",       "query",   "repulsion",
                                                       "penetration", "message", "publishing"};
   for (std::size_t i = 0; i < kCycleParts; ++i) {
     const std::string name = std::string("time of ") + names[i];
-    add_value(name + ", median", milliseconds(report.parts[i].quantile(0.5)), status);
-    add_value(name + ", 99th percentile", milliseconds(report.parts[i].quantile(0.99)), status);
+    add(name + ", median", milliseconds(report.parts[i].quantile(0.5)));
+    add(name + ", 99th percentile", milliseconds(report.parts[i].quantile(0.99)));
   }
 }
 
 }  // namespace
-
-using diagnostic_msgs::DiagnosticStatus;
 
 DiagnosticStatus make_diagnostic(const std::string& node, const std::string& what,
                                  const Findings& findings) {
@@ -148,19 +139,15 @@ DiagnosticStatus make_diagnostic(const std::string& node, const std::string& wha
   if (!worst) return status;
   status.level = static_cast<decltype(status.level)>(worst->level);
   status.message = worst->text;
-  add_value("since", format_text("%.0f s", worst->since), &status);
+  Values{&status}("since", format_text("%.0f s", worst->since));
   return status;
 }
 
-void add_value(const std::string& key, const std::string& value, DiagnosticStatus* status) {
+void Values::operator()(const std::string& key, const std::string& value) const {
   diagnostic_msgs::KeyValue pair;
   pair.key = key;
   pair.value = value;
   status->values.push_back(pair);
-}
-
-void add_value(const std::string& key, std::size_t value, DiagnosticStatus* status) {
-  add_value(key, std::to_string(value), status);
 }
 
 std::string milliseconds(double seconds) { return format_text("%.3f ms", 1e3 * seconds); }
@@ -200,27 +187,29 @@ DiagnosticStatus input_diagnostics(const std::string& node, const CycleReport& r
                                    std::size_t index, double rate, double now) {
   const SourceReport& source = report.sources[index];
   DiagnosticStatus status = make_diagnostic(node, "input " + source.name, report.findings);
-  add_source_counts(source, rate, now, &status);
-  if (!std::isnan(source.blind_skin)) add_view(source, &status);
+  const Values add{&status};
+  add_source_counts(source, rate, now, add);
+  if (!std::isnan(source.blind_skin)) add_view(source, add);
   return status;
 }
 
 DiagnosticStatus pose_diagnostics(const std::string& node, const CycleReport& report) {
   DiagnosticStatus status = make_diagnostic(node, "pose", report.findings);
-  add_value("links monitored", report.links_monitored, &status);
-  add_value("links with a pose", report.links_known, &status);
-  if (report.links_known > 0) add_value("age", format_text("%.3f s", report.pose_age), &status);
+  const Values add{&status};
+  add("links monitored", report.links_monitored);
+  add("links with a pose", report.links_known);
+  if (report.links_known > 0) add("age", format_text("%.3f s", report.pose_age));
   if (report.joint_states) {
     const JointStateReport& joints = *report.joint_states;
-    add_value("topic", joints.topic, &status);
-    add_value("publishers", joints.publishers, &status);
-    add_value("joint states received", joints.messages, &status);
-    add_value("joint states used", joints.used, &status);
-    add_value("joint states skipped: more came than can be answered", joints.skipped, &status);
-    add_value("positions that cannot be used", joints.dropped, &status);
+    add("topic", joints.topic);
+    add("publishers", joints.publishers);
+    add("joint states received", joints.messages);
+    add("joint states used", joints.used);
+    add("joint states skipped: more came than can be answered", joints.skipped);
+    add("positions that cannot be used", joints.dropped);
   }
   for (const Finding& finding : report.findings) {
-    if (finding.rank == Rank::kPose) add_value("problem", finding.text, &status);
+    if (finding.rank == Rank::kPose) add("problem", finding.text);
   }
   return status;
 }
@@ -233,28 +222,24 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   if (!findings.empty()) findings.front().since = report.findings.front().since;
   findings.insert(findings.end(), report.findings.begin(), report.findings.end());
   DiagnosticStatus status = make_diagnostic(node, "query", findings);
+  const Values add{&status};
   const std::string wanted = report.joint_states ? "rate of the joint states" : "~rate";
-  add_value("min_distance",
-            std::isnan(report.min_distance) ? "not known" : millimetres(report.min_distance),
-            &status);
-  if (!report.speed_scale.empty()) add_value("speed_scale", report.speed_scale, &status);
-  if (!report.counted_links.empty()) {
-    add_value("links left out", report.counted_links, &status);
-  }
-  if (!report.zones.empty()) add_value("zones", report.zones, &status);
-  add_value("live parameters",
-            report.parameter_problem.empty() ? "as on the server" : report.parameter_problem,
-            &status);
-  add_value("rate", format_text("%.1f Hz", rate), &status);
-  add_value(wanted, format_text("%.1f Hz", wanted_rate), &status);
-  add_deadline(report, &status);
-  add_value("markers drawn", report.markers_drawn, &status);
-  add_value("memory of the query",
-            format_text("%.1f MB", 1e-6 * static_cast<double>(report.query_memory)), &status);
-  add_value("computation time, median", milliseconds(report.times.quantile(0.5)), &status);
-  add_value("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)),
-            &status);
-  add_parts(report, &status);
+  add("min_distance",
+      std::isnan(report.min_distance) ? "not known" : millimetres(report.min_distance));
+  if (!report.speed_scale.empty()) add("speed_scale", report.speed_scale);
+  if (!report.counted_links.empty()) add("links left out", report.counted_links);
+  if (!report.zones.empty()) add("zones", report.zones);
+  add("live parameters",
+      report.parameter_problem.empty() ? "as on the server" : report.parameter_problem);
+  add("rate", format_text("%.1f Hz", rate));
+  add(wanted, format_text("%.1f Hz", wanted_rate));
+  add_deadline(report, add);
+  add("markers drawn", report.markers_drawn);
+  add("memory of the query",
+      format_text("%.1f MB", 1e-6 * static_cast<double>(report.query_memory)));
+  add("computation time, median", milliseconds(report.times.quantile(0.5)));
+  add("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)));
+  add_parts(report, add);
   return status;
 }
 

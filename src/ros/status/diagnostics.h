@@ -1,10 +1,8 @@
 #pragma once
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
-#include <ist_proximity/ProximityArray.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <string>
 
 #include "ist_proximity/contact/contact_model.h"
@@ -49,10 +47,14 @@ diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
 diagnostic_msgs::DiagnosticStatus make_diagnostic(const std::string& node, const std::string& what,
                                                   const Findings& findings);
 
-void add_value(const std::string& key, const std::string& value,
-               diagnostic_msgs::DiagnosticStatus* status);
-void add_value(const std::string& key, std::size_t value,
-               diagnostic_msgs::DiagnosticStatus* status);
+/// Adds values to a status.
+struct Values {
+  diagnostic_msgs::DiagnosticStatus* status;
+  void operator()(const std::string& key, const std::string& value) const;
+  void operator()(const std::string& key, std::size_t value) const {
+    (*this)(key, std::to_string(value));
+  }
+};
 
 std::string milliseconds(double seconds);
 std::string millimetres(double metres);

@@ -25,10 +25,9 @@ std::string contact_geometry_text(const ContactGeometry& body) {
 
 /// Adds the contact bodies, and why `penetration` may be NaN in contact.
 void add_contacts(const ModelState& state, const ContactModel* contacts, ContactsWanted wanted,
-                  DiagnosticStatus* status) {
+                  const Values& add) {
   if (wanted == ContactsWanted::kNone) {
-    add_value("contact volumes",
-              "off, ~penetration/enabled is false: penetration is NaN in contact", status);
+    add("contact volumes", "off, ~penetration/enabled is false: penetration is NaN in contact");
     return;
   }
   if (!state.robot) return;
@@ -41,20 +40,16 @@ void add_contacts(const ModelState& state, const ContactModel* contacts, Contact
     if (is_ready || wanted == ContactsWanted::kAll || state.usage->was_near(i)) ++needed;
     if (!is_ready) continue;
     ++ready;
-    add_value("volume of " + state.robot->links[i].name, contact_geometry_text(*contacts->links[i]),
-              status);
+    add("volume of " + state.robot->links[i].name, contact_geometry_text(*contacts->links[i]));
   }
-  add_value("contact volumes",
-            ready == needed ? "ready"
-                            : std::to_string(ready) + " of " + std::to_string(needed) +
-                                  " links; penetration is NaN in contact for those to come",
-            status);
-  add_value("links with a volume",
-            std::to_string(ready) + " of " + std::to_string(usable) +
-                (ready < usable && wanted == ContactsWanted::kAuto
-                     ? "; the others have none until something comes near them"
-                     : ""),
-            status);
+  add("contact volumes", ready == needed
+                             ? "ready"
+                             : std::to_string(ready) + " of " + std::to_string(needed) +
+                                   " links; penetration is NaN in contact for those to come");
+  add("links with a volume", std::to_string(ready) + " of " + std::to_string(usable) +
+                                 (ready < usable && wanted == ContactsWanted::kAuto
+                                      ? "; the others have none until something comes near them"
+                                      : ""));
 }
 
 bool falls_short(const LinkModel& link) {
@@ -79,7 +74,7 @@ std::string packing_text(const LinkModel& link) {
 double megabytes(std::size_t bytes) { return 1e-6 * static_cast<double>(bytes); }
 
 /// Adds how far background packing has got.
-void add_packings(const ModelState& state, DiagnosticStatus* status) {
+void add_packings(const ModelState& state, const Values& add) {
   if (!state.robot) return;
   std::size_t usable = 0, final = 0, spheres = 0, fields = 0, coarse_fields = 0;
   double largest_gap = 0.0;
@@ -93,25 +88,21 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
     spheres += link.packing.spheres.size();
     largest_gap = std::max(largest_gap, link.packing.certificate.max_gap);
   }
-  add_value("links with their final packing",
-            std::to_string(final) + " of " + std::to_string(usable) +
-                (final < usable ? "; the others get it when contact or link pairs need it" : ""),
-            status);
-  add_value("links with a distance field",
-            std::to_string(fields) + " of " + std::to_string(usable) +
-                (coarse_fields > 0 ? ", " + std::to_string(coarse_fields) + " coarse" : "") +
-                (fields < usable ? "; the others will get one" : ""),
-            status);
-  add_value("spheres", spheres, status);
+  add("links with their final packing",
+      std::to_string(final) + " of " + std::to_string(usable) +
+          (final < usable ? "; the others get it when contact or link pairs need it" : ""));
+  add("links with a distance field",
+      std::to_string(fields) + " of " + std::to_string(usable) +
+          (coarse_fields > 0 ? ", " + std::to_string(coarse_fields) + " coarse" : "") +
+          (fields < usable ? "; the others will get one" : ""));
+  add("spheres", spheres);
   const ModelMemory memory = memory_of(*state.robot);
-  add_value("memory",
-            format_text("%.1f MB: ", megabytes(memory.total())) +
-                format_text("packings %.1f, ", megabytes(memory.packings)) +
-                format_text("trees %.1f, ", megabytes(memory.trees)) +
-                format_text("exact geometry %.1f, ", megabytes(memory.solids)) +
-                format_text("distance fields %.1f", megabytes(memory.fields)),
-            status);
-  add_value("largest gap", millimetres(largest_gap), status);
+  add("memory", format_text("%.1f MB: ", megabytes(memory.total())) +
+                    format_text("packings %.1f, ", megabytes(memory.packings)) +
+                    format_text("trees %.1f, ", megabytes(memory.trees)) +
+                    format_text("exact geometry %.1f, ", megabytes(memory.solids)) +
+                    format_text("distance fields %.1f", megabytes(memory.fields)));
+  add("largest gap", millimetres(largest_gap));
 }
 
 }  // namespace
@@ -129,22 +120,23 @@ DiagnosticStatus model_diagnostics(const std::string& node, const Findings& find
                                    const ModelState& state, const ContactModel* contacts,
                                    ContactsWanted contacts_wanted) {
   DiagnosticStatus status = make_diagnostic(node, "model", findings);
+  const Values add{&status};
   const bool ready = state.is_ready();
-  add_value("ready", ready ? "100 %" : format_text("%.0f %%", 100 * state.fraction), &status);
-  add_value("links monitored", state.links.size(), &status);
-  if (ready) add_value("links", link_counts(state), &status);
-  if (!state.choice.remarks.empty()) add_value("links left out", state.choice.remarks, &status);
+  add("ready", ready ? "100 %" : format_text("%.0f %%", 100 * state.fraction));
+  add("links monitored", state.links.size());
+  if (ready) add("links", link_counts(state));
+  if (!state.choice.remarks.empty()) add("links left out", state.choice.remarks);
   for (const AttachedObject& object : state.objects) {
-    add_value("attached object", "'" + object.name + "' on '" + object.link + "'", &status);
+    add("attached object", "'" + object.name + "' on '" + object.link + "'");
   }
   for (const std::size_t i : state.monitored) {
     const LinkModel& link = state.robot->links[i];
     if (is_pending(link)) continue;
-    add_value(link.name, link.usable() ? packing_text(link) : link.error, &status);
+    add(link.name, link.usable() ? packing_text(link) : link.error);
   }
-  add_packings(state, &status);
-  add_contacts(state, contacts, contacts_wanted, &status);
-  for (const std::string& warning : state.warnings) add_value("warning", warning, &status);
+  add_packings(state, add);
+  add_contacts(state, contacts, contacts_wanted, add);
+  for (const std::string& warning : state.warnings) add("warning", warning);
   return status;
 }
 

@@ -1,6 +1,5 @@
 #include <ist_proximity/ProximityArray.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "internal/cloud/unmeasured.h"
@@ -16,8 +15,11 @@ std::string seconds(double value) {
   return std::abs(value) < 100 ? format_text("%.2f s", value) : format_text("%.0f s", value);
 }
 
-std::string title(const SourceReport& source) {
-  return "source '" + source.name + "' on " + source.topic;
+Status no_cloud(const SourceReport& source, const std::string& text) {
+  return {ProximityArray::NO_CLOUD, "source '" + source.name + "' on " + source.topic + text};
+}
+Status stale_cloud(const SourceReport& source, const std::string& text) {
+  return {ProximityArray::STALE_CLOUD, no_cloud(source, text).text};
 }
 
 std::string allowed(const SourceReport& source) {
@@ -28,30 +30,25 @@ std::string because(const std::string& problem) {
   return problem.empty() ? std::string() : ": " + problem;
 }
 
-Status file_status(const SourceReport& source) {
-  if (source.has_snapshot) return {ProximityArray::OK, ""};
-  const std::string& problem = source.problem;
-  return {ProximityArray::NO_CLOUD, "source '" + source.name + "': " +
-                                        (problem.empty() ? "its file is being read" : problem)};
+/// Of a source without a topic, or whose topic is not the reason.
+Status without_topic(const SourceReport& source, const std::string& text) {
+  return {ProximityArray::NO_CLOUD, "source '" + source.name + "': " + text};
 }
 
 /// What is missing must not read as free.
-Status incomplete(const SourceReport& source) {
-  return {ProximityArray::NO_CLOUD, "source '" + source.name + "': " + source.incomplete};
-}
+Status incomplete(const SourceReport& source) { return without_topic(source, source.incomplete); }
 
 Status without_messages(const SourceReport& source) {
   if (source.working > 1.0) {
-    return {ProximityArray::NO_CLOUD, title(source) + ": the first " + source.noun +
-                                          " has been read for " + seconds(source.working) +
-                                          " so far"};
+    return no_cloud(source, ": the first " + source.noun + " has been read for " +
+                                seconds(source.working) + " so far");
   }
   const std::string cause = source.publishers == 0
                                 ? ", nobody publishes a " + source.type +
                                       " there; start the sensor's driver, or set or remap the topic"
                                 : ", although there is a publisher";
   const std::string advice = source.advice.empty() ? "" : "; " + source.advice;
-  return {ProximityArray::NO_CLOUD, title(source) + ": nothing received yet" + cause + advice};
+  return no_cloud(source, ": nothing received yet" + cause + advice);
 }
 
 /// The share of the timeout from which the time to read and ingest a message is why it is stale.
@@ -93,9 +90,9 @@ std::string question(const SourceReport& source) {
 
 Status stale(const SourceReport& source, double age) {
   const std::string cause = cause_of_staleness(source);
-  return {ProximityArray::STALE_CLOUD, title(source) + ": the newest " + source.noun + " is " +
-                                           seconds(age) + " old, allowed is " + allowed(source) +
-                                           (cause.empty() ? question(source) : cause)};
+  return stale_cloud(source, ": the newest " + source.noun + " is " + seconds(age) +
+                                 " old, allowed is " + allowed(source) +
+                                 (cause.empty() ? question(source) : cause));
 }
 
 /// [s] Two instants of one message, its receipt and the beginning of its work, differ by less.
@@ -112,9 +109,8 @@ Status stale_snapshot(const SourceReport& source, double age) {
   } else if (cause.empty()) {
     cause = question(source);
   }
-  return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun + " is " +
-                                           seconds(age) + " old, allowed is " + allowed(source) +
-                                           cause};
+  return stale_cloud(source, ": the last usable " + source.noun + " is " + seconds(age) +
+                                 " old, allowed is " + allowed(source) + cause);
 }
 
 /// The prefix of the parameters of a source.
@@ -127,8 +123,8 @@ Status view_status(const SourceReport& source) {
   const IngestCounts& counts = source.counts;
   if (counts.saw_enough(source.min_measured)) return {ProximityArray::OK, ""};
   if (counts.not_a_number + counts.noise == counts.received) {
-    return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
-                                          " is NaN, the sensor sees nothing at all"};
+    return no_cloud(source, ": every point of the newest " + source.noun +
+                                " is NaN, the sensor sees nothing at all");
   }
   const std::string question =
       counts.not_believed <= counts.received / 2
@@ -136,12 +132,11 @@ Status view_status(const SourceReport& source) {
           : format_text(": more than %g m (or a larger ~", source.sensor_range) +
                 prefix_of(source) +
                 "max_range), or than range_max of a scan; are its lengths in metres?";
-  return {ProximityArray::NO_CLOUD,
-          title(source) + ": " +
-              format_text("only %.1f %% of the newest ", 100.0 * counts.measured_share()) +
-              source.noun + " was measured, " +
-              format_text("at least %g %% are needed: of ", 100.0 * source.min_measured) +
-              std::to_string(counts.received) + " points " + unmeasured(counts) + question};
+  return no_cloud(source,
+                  format_text(": only %.1f %% of the newest ", 100.0 * counts.measured_share()) +
+                      source.noun + " was measured, " +
+                      format_text("at least %g %% are needed: of ", 100.0 * source.min_measured) +
+                      std::to_string(counts.received) + " points " + unmeasured(counts) + question);
 }
 
 }  // namespace
@@ -149,24 +144,28 @@ Status view_status(const SourceReport& source) {
 Status source_status(const SourceReport& source, double now) {
   if (source.is_memory) return memory_status(source, {ProximityArray::OK, ""});
   if (!source.measures && !source.incomplete.empty()) return incomplete(source);
-  if (source.is_file) return file_status(source);
+  if (source.is_file) {
+    if (source.has_snapshot) return {ProximityArray::OK, ""};
+    return without_topic(source,
+                         source.problem.empty() ? "its file is being read" : source.problem);
+  }
   if (source.messages == 0) return without_messages(source);
   if (std::isnan(source.newest)) {  // all stamps are 0 or far in the future
-    return {ProximityArray::STALE_CLOUD, title(source) + because(source.problem)};
+    return stale_cloud(source, because(source.problem));
   }
   const double newest_age = now - source.newest;
   if (newest_age > source.timeout) return stale(source, newest_age);
   if (!source.has_snapshot) {
-    return {ProximityArray::NO_CLOUD, title(source) + ": no " + source.noun + " could be used yet" +
-                                          cause_of_staleness(source)};
+    return no_cloud(source,
+                    ": no " + source.noun + " could be used yet" + cause_of_staleness(source));
   }
   const double age = now - source.counts_from.toSec();
   if (age > source.timeout) return stale_snapshot(source, age);
   if (now - source.same_since > source.frozen_after) {  // false for NaN
-    return {ProximityArray::STALE_CLOUD,
-            title(source) + ": all of its " + source.noun + "s have held the same bytes for " +
-                seconds(now - source.same_since) + ", allowed is " + seconds(source.frozen_after) +
-                " (~" + prefix_of(source) + "frozen_after): its driver repeats itself"};
+    return stale_cloud(source, ": all of its " + source.noun + "s have held the same bytes for " +
+                                   seconds(now - source.same_since) + ", allowed is " +
+                                   seconds(source.frozen_after) + " (~" + prefix_of(source) +
+                                   "frozen_after): its driver repeats itself");
   }
   const Status view = view_status(source);
   if (!view.ok()) return view;
@@ -175,13 +174,12 @@ Status source_status(const SourceReport& source, double now) {
 }
 
 Status memory_status(const SourceReport& memory, const Status& parent) {
-  const std::string title = "source '" + memory.name + "': ";
   if (!memory.has_snapshot) {
-    return {ProximityArray::NO_CLOUD,
-            title + (memory.problem.empty() ? "nothing is remembered yet" : memory.problem)};
+    return without_topic(memory,
+                         memory.problem.empty() ? "nothing is remembered yet" : memory.problem);
   }
   if (parent.ok()) return parent;
-  return {parent.code, title + "it is as fresh as its source: " + parent.text};
+  return {parent.code, without_topic(memory, "it is as fresh as its source: " + parent.text).text};
 }
 
 }  // namespace ist
