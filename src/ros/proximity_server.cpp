@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <boost/make_shared.hpp>
-#include <utility>
 
 #include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
@@ -189,7 +188,6 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
 /// @param is_of_cycle  whether the cycle has made it
 void ProximityServer::Impl::publish(const ist_proximity::ProximityArrayConstPtr& message,
                                     bool is_of_cycle, const SpeedScaleConfig& speed_scale) {
-  spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = is_of_cycle && self_proximity_ ? self_proximity_->newest() : nullptr;
   const bool has_cycle = is_of_cycle && cycle_;
   summary_.publish(*message, self.get(), speed_scale, ros::Time::now(),
@@ -220,7 +218,6 @@ void ProximityServer::Impl::run_cycle() {
   take_model();
   notice_standing_root();
   notice_ignored_links(now);
-  spheres_.repeat_when_due();
   const auto message = messages_.take();
   const std::string transform_problem = buffer_.problem();
   LiveConfig live = live_config();
@@ -280,13 +277,10 @@ void ProximityServer::Impl::publish_diagnostics() {
     report_.worst_deadline = DeadlineCost();
   }
   report.parameter_problem = live_.problem();
-  for (const std::string& remark :
-       {report.parameter_problem, live_.without_effect(), counted_problem}) {
-    note(Rank::kRemark, "query", remark, &report.findings);
-  }
-  for (const std::string& remark : zone_services_.remarks()) {
-    note(Rank::kRemark, "query", remark, &report.findings);
-  }
+  note(Rank::kRemark, "query",
+       std::vector<std::string>{report.parameter_problem, live_.without_effect(), counted_problem},
+       &report.findings);
+  note(Rank::kRemark, "query", zone_services_.remarks(), &report.findings);
   report.zones = zones_.summary(ros::Time::now());
   zone_services_.show();
   spheres_.show(*loader_.state());

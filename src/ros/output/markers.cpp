@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <tuple>
 
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/frame_name.h"
@@ -13,6 +14,7 @@
 namespace ist {
 namespace {
 
+using geometry_msgs::Point;
 using ist_proximity::ProximityArray;
 using visualization_msgs::Marker;
 using visualization_msgs::MarkerArray;
@@ -41,6 +43,12 @@ void scale(double x, double y, double z, Marker* marker) {
   marker->scale.x = x;
   marker->scale.y = y;
   marker->scale.z = z;
+}
+
+Point point_of(const Eigen::Vector3d& p) {
+  Point point;
+  assign(p, &point);
+  return point;
 }
 
 }  // namespace
@@ -97,72 +105,56 @@ std_msgs::ColorRGBA nearness_color(double distance, double max_distance) {
   return make_color(std::min(1.0, 2.0 * (1.0 - far)), std::min(1.0, 2.0 * far), 0.1, 1.0);
 }
 
-Marker ProximityMarkers::marker(const std::string& ns, int id, int type) const {
-  Marker result;
-  result.header = header_;
-  result.ns = ns;
-  result.id = id;
-  result.type = type;
-  result.action = Marker::ADD;
-  result.pose.orientation.w = 1.0;
-  result.lifetime = ros::Duration(lifetime_);
-  return result;
+Marker& ProximityMarkers::add(const char* ns, std::size_t id, int type, double x, double y,
+                              double z, const Color& color) {
+  drawn_.emplace_back();
+  Marker& marker = drawn_.back();
+  marker.header = header_;
+  marker.ns = ns;
+  marker.id = static_cast<int>(id);
+  marker.type = type;
+  marker.action = Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  marker.lifetime = ros::Duration(lifetime_);
+  scale(x, y, z, &marker);
+  marker.color = color;
+  return marker;
 }
 
-void ProximityMarkers::draw_link(const LinkMessage& link, int id,
-                                 std::vector<Marker>* markers) const {
+void ProximityMarkers::add_line(const char* ns, std::size_t id, double width, const Color& color,
+                                const Point& from, const Point& to) {
+  add(ns, id, Marker::LINE_LIST, width, 0, 0, color).points = {from, to};
+}
+
+void ProximityMarkers::add_solid(const char* ns, std::size_t id, int type, double size,
+                                 const Color& color, const Point& center) {
+  add(ns, id, type, size, size, size, color).pose.position = center;
+}
+
+/// @param above  [m] of its middle, from the lower edge of the large number
+void ProximityMarkers::add_text(const char* ns, std::size_t id, double height, double above,
+                                const Color& color, const std::string& text) {
+  Marker& marker = add(ns, id, Marker::TEXT_VIEW_FACING, 0, 0, height, color);
+  marker.pose.position = point_of(list_position_ + Eigen::Vector3d(0, 0, above));
+  marker.text = text;
+}
+
+void ProximityMarkers::draw_link(const LinkMessage& link, std::size_t id) {
   const std_msgs::ColorRGBA shade = nearness_color(link.distance, max_distance_);
-
-  Marker line = marker("distance", id, Marker::LINE_LIST);
-  scale(kLineWidth, 0, 0, &line);
-  line.color = shade;
-  line.points = {link.point_on_obstacle, link.point_on_link};
-  markers->push_back(line);
-
-  const auto add_point = [&](const char* ns, const geometry_msgs::Point& position,
-                             const std_msgs::ColorRGBA& point_color) {
-    Marker point = marker(ns, id, Marker::SPHERE);
-    scale(kPointSize, kPointSize, kPointSize, &point);
-    point.color = point_color;
-    point.pose.position = position;
-    markers->push_back(point);
-  };
-  add_point("point_on_link", link.point_on_link, shade);
-  add_point("point_on_obstacle", link.point_on_obstacle, make_color(0.2, 0.4, 1.0, 1.0));
-
-  const Eigen::Vector3d repulsion = to_vector(link.repulsion);
-  const double length = repulsion.norm() * kArrowPerRepulsion;
-  if (length > 1e-3 && std::isfinite(length)) {
-    Marker arrow = marker("repulsion", id, Marker::ARROW);
-    scale(2 * kLineWidth, 4 * kLineWidth, std::min(0.3 * length, 6 * kLineWidth), &arrow);
-    arrow.color = make_color(0.8, 0.35, 1.0, 0.9);
-    geometry_msgs::Point tip = link.point_on_link;
-    assign(to_vector(tip) + repulsion * kArrowPerRepulsion, &tip);
-    arrow.points = {link.point_on_link, tip};
-    markers->push_back(arrow);
-  }
+  const Point &on_link = link.point_on_link, &on_obstacle = link.point_on_obstacle;
+  add_line("distance", id, kLineWidth, shade, on_obstacle, on_link);
+  add_solid("point_on_link", id, Marker::SPHERE, kPointSize, shade, on_link);
+  add_solid("point_on_obstacle", id, Marker::SPHERE, kPointSize, make_color(0.2, 0.4, 1.0, 1.0),
+            on_obstacle);
+  const Eigen::Vector3d arrow = to_vector(link.repulsion) * kArrowPerRepulsion;
+  const double length = arrow.norm();
+  if (!(length > 1e-3 && std::isfinite(length))) return;
+  add("repulsion", id, Marker::ARROW, 2 * kLineWidth, 4 * kLineWidth,
+      std::min(0.3 * length, 6 * kLineWidth), make_color(0.8, 0.35, 1.0, 0.9))
+      .points = {on_link, point_of(to_vector(on_link) + arrow)};
 }
 
-/// The line ends in a cube, as unknown space is made of voxels.
-void ProximityMarkers::draw_unseen(const MarkerScene::UnseenLine& unseen,
-                                   std::vector<Marker>* markers) const {
-  const std_msgs::ColorRGBA grey = nearness_color(std::nan(""), max_distance_);
-  Marker line = marker("unseen", static_cast<int>(unseen.link), Marker::LINE_LIST);
-  scale(kLineWidth, 0, 0, &line);
-  line.color = grey;
-  line.points.resize(2);
-  assign(unseen.p_FCo, &line.points[0]);
-  assign(unseen.p_FCl, &line.points[1]);
-  markers->push_back(line);
-  Marker end = marker("unseen_end", static_cast<int>(unseen.link), Marker::CUBE);
-  scale(kPointSize, kPointSize, kPointSize, &end);
-  end.color = grey;
-  assign(unseen.p_FCo, &end.pose.position);
-  markers->push_back(end);
-}
-
-void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links,
-                                   std::vector<Marker>* markers) const {
+void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < links.size(); ++i) {
     if (links[i].state >= LinkMessage::NEAR && links[i].distance <= kLabelled) order.push_back(i);
@@ -172,46 +164,27 @@ void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links,
   });
   for (std::size_t row = 0; row < std::min(order.size(), kLabels); ++row) {
     const LinkMessage& link = links[order[row]];
-    Marker text = marker("text", static_cast<int>(order[row]), Marker::TEXT_VIEW_FACING);
-    scale(0, 0, kTextHeight, &text);
-    text.color = nearness_color(link.distance, max_distance_);
-    const double below = kGap + (static_cast<double>(row) + 0.5) * kRow;
-    assign(list_position_ - Eigen::Vector3d(0, 0, below), &text.pose.position);
-    text.text = link.link + format_text(" %.3f m", link.distance);
+    std::string text = link.link + format_text(" %.3f m", link.distance);
     if (std::isfinite(link.robot_future)) {
-      text.text += format_text(", %.3f m until it stands", link.robot_future);
+      text += format_text(", %.3f m until it stands", link.robot_future);
     } else if (!std::isnan(link.robot_future)) {
-      text.text += ", NOT KNOWN until it stands";
+      text += ", NOT KNOWN until it stands";
     }
-    markers->push_back(text);
+    add_text("text", order[row], kTextHeight, -kGap - (static_cast<double>(row) + 0.5) * kRow,
+             nearness_color(link.distance, max_distance_), text);
   }
 }
 
-void ProximityMarkers::draw_nearest(const ist_proximity::ProximityArray& proximity,
-                                    std::vector<Marker>* markers) {
-  const NearestSummary summary = summarize_nearest(proximity, max_distance_, counts_);
-  Marker text = marker("nearest", 0, Marker::TEXT_VIEW_FACING);
-  scale(0, 0, kNumberHeight, &text);
-  text.color = summary.color;
-  text.text = summary.text;
-  const auto lines = 1 + std::count(text.text.begin(), text.text.end(), '\n');
+void ProximityMarkers::draw_nearest(const ProximityArray& proximity) {
+  NearestSummary summary = summarize_nearest(proximity, max_distance_, counts_);
+  const auto lines = 1 + std::count(summary.text.begin(), summary.text.end(), '\n');
   const double above = 0.5 * kNumberHeight * static_cast<double>(lines);  // rviz centers the text
-  assign(list_position_ + Eigen::Vector3d(0, 0, above), &text.pose.position);
-  markers->push_back(text);
+  add_text("nearest", 0, kNumberHeight, above, summary.color, summary.text);
   if (summary.link < 0) return;
-
   const LinkMessage& link = proximity.links[static_cast<std::size_t>(summary.link)];
-  Marker line = marker("nearest", 1, Marker::LINE_LIST);
-  scale(3 * kLineWidth, 0, 0, &line);
-  line.color = summary.color;
-  line.points = {link.point_on_obstacle, link.point_on_link};
-  markers->push_back(line);
-  Marker halo = marker("nearest", 2, Marker::SPHERE);
-  scale(3 * kPointSize, 3 * kPointSize, 3 * kPointSize, &halo);
-  halo.color = summary.color;
-  halo.color.a = 0.5F;
-  halo.pose.position = link.point_on_link;
-  markers->push_back(halo);
+  add_line("nearest", 1, 3 * kLineWidth, summary.color, link.point_on_obstacle, link.point_on_link);
+  summary.color.a = 0.5F;  // a halo
+  add_solid("nearest", 2, Marker::SPHERE, 3 * kPointSize, summary.color, link.point_on_link);
 }
 
 /// Moves number and labels slowly to a place above the robot, so that they can be read while it
@@ -229,36 +202,29 @@ MarkerArray ProximityMarkers::draw(const ist_proximity::ProximityArray& proximit
                                    const MarkerScene& scene) {
   header_ = proximity.header;
   place_list(scene.robot);
-  MarkerArray result;
   for (std::size_t i = 0; i < proximity.links.size(); ++i) {
-    if (proximity.links[i].state >= LinkMessage::NEAR) {
-      draw_link(proximity.links[i], static_cast<int>(i), &result.markers);
-    }
+    if (proximity.links[i].state >= LinkMessage::NEAR) draw_link(proximity.links[i], i);
   }
-  for (const MarkerScene::UnseenLine& unseen : scene.unseen) draw_unseen(unseen, &result.markers);
-  draw_labels(proximity.links, &result.markers);
-  draw_nearest(proximity, &result.markers);
+  const std_msgs::ColorRGBA grey = nearness_color(std::nan(""), max_distance_);
+  for (const MarkerScene::UnseenLine& unseen : scene.unseen) {
+    const Point end = point_of(unseen.p_FCo);
+    add_line("unseen", unseen.link, kLineWidth, grey, end, point_of(unseen.p_FCl));
+    add_solid("unseen_end", unseen.link, Marker::CUBE, kPointSize, grey, end);  // a voxel
+  }
+  draw_labels(proximity.links);
+  draw_nearest(proximity);
 
-  std::map<Key, std_msgs::Header> shown;
-  for (const Marker& drawn : result.markers) shown[{drawn.ns, drawn.id}] = drawn.header;
-  for (const auto& [key, header] : shown_) {
-    if (shown.count(key) > 0) continue;
-    Marker removed;
-    removed.header = header;
-    removed.ns = key.first;
-    removed.id = key.second;
-    removed.action = Marker::DELETE;
-    result.markers.push_back(removed);
-  }
-  shown_ = std::move(shown);
+  MarkerArray result;
+  result.markers = std::move(drawn_);
+  drawn_.clear();
+  shown_.complete(&result);
   return result;
 }
 
 MarkerArray sphere_markers(const RobotModel& model, const std::vector<std::size_t>& links,
                            std::size_t max_per_link) {
   MarkerArray result;
-  std_msgs::ColorRGBA color = nearness_color(std::nan(""), 1.0);  // until something is measured
-  color.a = kSphereAlpha;
+  const std_msgs::ColorRGBA color = make_color(0.6, 0.6, 0.6, 0.6);
   for (const std::size_t i : links) {
     const LinkModel& link = model.links[i];
     std::vector<InnerSphere> spheres = link.packing.spheres;
@@ -284,10 +250,19 @@ MarkerArray sphere_markers(const RobotModel& model, const std::vector<std::size_
   return result;
 }
 
-MarkerArray deleted(const MarkerArray& markers) {
-  MarkerArray result = markers;
-  for (Marker& marker : result.markers) marker.action = Marker::DELETE;
-  return result;
+void ShownMarkers::complete(MarkerArray* markers) {
+  decltype(shown_) shown;
+  for (const Marker& marker : markers->markers) shown[{marker.ns, marker.id}] = marker.header;
+  for (const auto& [key, header] : shown_) {
+    if (shown.count(key) > 0) continue;
+    Marker removed;
+    removed.header = header;
+    std::tie(removed.ns, removed.id) = key;
+    removed.action = Marker::DELETE;
+    removed.pose.orientation.w = 1.0;
+    markers->markers.push_back(removed);
+  }
+  shown_ = std::move(shown);
 }
 
 }  // namespace ist

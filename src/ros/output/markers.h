@@ -47,6 +47,16 @@ struct MarkerScene {
   std::vector<UnseenLine> unseen;
 };
 
+/// The markers that rviz shows. Not thread safe.
+class ShownMarkers {
+ public:
+  /// Adds what deletes those of the last call that are no longer among the markers.
+  void complete(visualization_msgs::MarkerArray* markers);
+
+ private:
+  std::map<std::pair<std::string, int>, std_msgs::Header> shown_;  ///< by namespace and id
+};
+
 /// Draws a ProximityArray for rviz, in its own frame. Namespaces: "distance" (line from obstacle to
 /// link), "point_on_link", "point_on_obstacle", "repulsion" (violet arrow) and "text" (name and
 /// distance of the nearest links within 0.3 m, and robot_future where it is stated), "unseen" (grey
@@ -71,17 +81,20 @@ class ProximityMarkers {
                                        const MarkerScene& scene);
 
  private:
-  using Key = std::pair<std::string, int>;  // namespace and id
+  using Point = geometry_msgs::Point;
+  using Color = std_msgs::ColorRGBA;
 
-  visualization_msgs::Marker marker(const std::string& ns, int id, int type) const;
-  void draw_link(const ist_proximity::LinkProximity& link, int id,
-                 std::vector<visualization_msgs::Marker>* markers) const;
-  void draw_unseen(const MarkerScene::UnseenLine& unseen,
-                   std::vector<visualization_msgs::Marker>* markers) const;
-  void draw_labels(const std::vector<ist_proximity::LinkProximity>& links,
-                   std::vector<visualization_msgs::Marker>* markers) const;
-  void draw_nearest(const ist_proximity::ProximityArray& proximity,
-                    std::vector<visualization_msgs::Marker>* markers);
+  visualization_msgs::Marker& add(const char* ns, std::size_t id, int type, double x, double y,
+                                  double z, const Color& color);
+  void add_line(const char* ns, std::size_t id, double width, const Color& color, const Point& from,
+                const Point& to);
+  void add_solid(const char* ns, std::size_t id, int type, double size, const Color& color,
+                 const Point& center);
+  void add_text(const char* ns, std::size_t id, double height, double above, const Color& color,
+                const std::string& text);
+  void draw_link(const ist_proximity::LinkProximity& link, std::size_t id);
+  void draw_labels(const std::vector<ist_proximity::LinkProximity>& links);
+  void draw_nearest(const ist_proximity::ProximityArray& proximity);
   void place_list(const Eigen::AlignedBox3d& robot);
 
   double max_distance_, lifetime_;
@@ -91,20 +104,16 @@ class ProximityMarkers {
   /// is taken at once
   Eigen::Vector3d list_position_{0.0, 0.0, 1.0};
   bool is_placed_ = false;
-  std::map<Key, std_msgs::Header> shown_;
+  std::vector<visualization_msgs::Marker> drawn_;  ///< by draw(), so far
+  ShownMarkers shown_;
 };
 
-constexpr float kSphereAlpha = 0.6F;
-
 /// Draws the largest inner spheres of some links in the links' own frames, so that rviz moves them
-/// along. Each link has a namespace of its own. They are grey: nothing has been measured yet.
+/// along. Each link has a namespace of its own. They are grey.
 /// @param links         indices into the model
 /// @param max_per_link  largest number of spheres of one link
 visualization_msgs::MarkerArray sphere_markers(const RobotModel& model,
                                                const std::vector<std::size_t>& links,
                                                std::size_t max_per_link);
-
-/// Makes an array that deletes every marker of another.
-visualization_msgs::MarkerArray deleted(const visualization_msgs::MarkerArray& markers);
 
 }  // namespace ist

@@ -8,7 +8,6 @@
 
 #include <set>
 #include <string>
-#include <vector>
 
 #include "ist_proximity/proximity/speed_scale.h"
 #include "ros/model/counted_links.h"

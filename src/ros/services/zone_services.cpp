@@ -53,19 +53,7 @@ ZoneServices::ZoneServices(ros::NodeHandle private_nh, const ServerConfig& confi
 void ZoneServices::show() {
   visualization_msgs::MarkerArray array = zones_.markers(ros::Time::now());
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::set<std::string> gone = std::move(shown_);
-  shown_.clear();
-  for (const visualization_msgs::Marker& marker : array.markers) {
-    gone.erase(marker.ns);
-    shown_.insert(marker.ns);
-  }
-  for (const std::string& name : gone) {
-    visualization_msgs::Marker marker;
-    marker.ns = name;
-    marker.action = visualization_msgs::Marker::DELETE;
-    marker.pose.orientation.w = 1.0;
-    array.markers.push_back(marker);
-  }
+  shown_.complete(&array);
   if (!array.markers.empty()) publish_message(markers_, array);
 }
 

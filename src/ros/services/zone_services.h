@@ -7,12 +7,12 @@
 #include <ros/service_server.h>
 
 #include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "ros/input/zone_store.h"
 #include "ros/model/model_loader.h"
+#include "ros/output/markers.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/transform_buffer.h"
 
@@ -41,8 +41,8 @@ class ZoneServices {
   const TransformBuffer& buffer_;
   const ModelLoader& loader_;
   ZoneStore& zones_;
-  std::mutex mutex_;             ///< guards the next one
-  std::set<std::string> shown_;  ///< the markers' namespaces
+  std::mutex mutex_;  ///< guards the next one
+  ShownMarkers shown_;
   ros::Publisher markers_;
   std::vector<ros::ServiceServer> services_;
 };
