@@ -26,18 +26,20 @@ class CallbackThread {
   ros::CallbackQueue* queue() { return &queue_; }
 
   /// Starts the thread.
-  /// @param meanwhile  called between the rounds of callbacks, 20 times a second or more often
-  void start(const std::string& name, std::function<void()> meanwhile) {
-    thread_ = std::thread([this, name, meanwhile = std::move(meanwhile)] {
+  /// @param meanwhile      called between the rounds of callbacks, 20 times a second or more often
+  /// @param is_background  gives it a low priority
+  void start(const std::string& name, std::function<void()> meanwhile, bool is_background = false) {
+    thread_ = std::thread([this, name, is_background, meanwhile = std::move(meanwhile)] {
       name_thread(name);
+      if (is_background) lower_thread_priority();
       while (running_) {
         const std::string fault = exception_of([&] {
           meanwhile();
           queue_.callAvailable(ros::WallDuration(0.05));
         });
         if (fault.empty()) continue;
-        ROS_ERROR_STREAM_THROTTLE(5.0, "a message or request to thread '"
-                                           << name << "' is dropped, it failed: " << fault);
+        ROS_ERROR_STREAM_THROTTLE(
+            5.0, "a task of thread '" << name << "' is dropped, it failed: " << fault);
       }
     });
   }

@@ -63,4 +63,9 @@ std::string nearest_name(const std::string& name, const std::set<std::string>& c
   return nearest;
 }
 
+std::string did_you_mean(const std::string& name, const std::set<std::string>& candidates) {
+  const std::string nearest = nearest_name(name, candidates);
+  return nearest.empty() ? "" : "; did you mean " + quoted(nearest) + "?";
+}
+
 }  // namespace ist

@@ -16,4 +16,10 @@ std::string join(const std::vector<std::string>& texts, const std::string& separ
 /// distance; empty when every candidate differs in more than a third of the letters.
 std::string nearest_name(const std::string& name, const std::set<std::string>& candidates);
 
+/// "; did you mean 'NAME'?", or empty.
+std::string did_you_mean(const std::string& name, const std::set<std::string>& candidates);
+
+/// A name in quotation marks.
+inline std::string quoted(const std::string& name) { return "'" + name + "'"; }
+
 }  // namespace ist

@@ -100,12 +100,12 @@ const SourceSnapshot* CloudSelection::newest(const CloudSources& sources, std::s
 }
 
 ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer) const {
-  const auto cloud = static_cast<std::size_t>(answer.source);
-  if (answer.source < 0 || cloud >= clouds_.size()) return {};
+  const int source = source_of(answer);
+  if (source < 0) return {};
   // The points in zones are of the same measurement.
-  const int source = cloud_sources_[cloud];
   const CloudSnapshot& whole = selected_[static_cast<std::size_t>(source)]->cloud;
-  return {source, obstacles_key({&whole}), whole.stamp, cloud_stands_still_[cloud]};
+  return {source, obstacles_key({&whole}), whole.stamp,
+          cloud_stands_still_[static_cast<std::size_t>(answer.source)]};
 }
 
 int CloudSelection::source_of(const LinkProximity& answer) const {

@@ -13,8 +13,6 @@ using ist_proximity::ProximityArray;
 
 namespace {
 
-std::string quoted(const std::string& name) { return "'" + name + "'"; }
-
 /// The end of a sentence: poses that are older than a cloud are why it has none at its stamp.
 std::string older_than_cloud(const StampedLinkPoses& poses, const PoseSource* source,
                              const SourceSnapshot& snapshot) {

@@ -164,9 +164,8 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   place_carried_objects();
   note_late_frames();
   // The world is known exactly and costs little: it may take half of the time.
-  worlds_.set_influence_distance(config.repulsion.influence_distance);
-  worlds_.run(poses_.X_FL, known_, selection_, query, poses_.stamp.toSec(),
-              end_of(query.deadline, 0.5 * kQueryShare, begin), &late_worlds_,
+  worlds_.run(poses_.X_FL, known_, selection_, query, config.repulsion.influence_distance,
+              poses_.stamp.toSec(), end_of(query.deadline, 0.5 * kQueryShare, begin), &late_worlds_,
               &status_input_.deadline);
   if (query.deadline > 0.0) {
     const std::chrono::duration<double> left =

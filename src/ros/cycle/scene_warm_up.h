@@ -1,7 +1,5 @@
 #pragma once
 
-#include <ros/time.h>
-
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>

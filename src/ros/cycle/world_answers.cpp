@@ -38,8 +38,9 @@ void WorldAnswers::note_motion(const CloudSelection& selection, double time) {
 }
 
 void WorldAnswers::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
-                       const CloudSelection& selection, QueryConfig query, double time,
-                       TimePoint end, LateFrames* late, DeadlineCost* cost) {
+                       const CloudSelection& selection, QueryConfig query,
+                       double influence_distance, double time, TimePoint end, LateFrames* late,
+                       DeadlineCost* cost) {
   is_nearest_.assign(X_FL.size(), false);
   any_ = !selection.worlds().empty();
   time_ = time;
@@ -51,7 +52,7 @@ void WorldAnswers::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<boo
   const double max_distance = query.max_distance;
   query.max_distance = late->range(max_distance);
   query_->set_config(query);
-  query_->set_influence_distance(influence_distance_);
+  query_->set_influence_distance(influence_distance);
   query_->run(X_FL, known, selection.worlds(), end, &answers_);
   late->lower(max_distance, &answers_);
   cost->unfinished += query_->statistics().unfinished;

@@ -21,8 +21,8 @@ class WorldAnswers {
   /// @param late  frames of the worlds; receives what it took off
   /// @param cost  links that `end` left unfinished are added
   void run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
-           const CloudSelection& selection, QueryConfig query, double time, TimePoint end,
-           LateFrames* late, DeadlineCost* cost);
+           const CloudSelection& selection, QueryConfig query, double influence_distance,
+           double time, TimePoint end, LateFrames* late, DeadlineCost* cost);
 
   /// Takes the nearer of cloud and world for each link; the lower bound is that of both. A link
   /// that is UNKNOWN to either is UNKNOWN.
@@ -49,7 +49,6 @@ class WorldAnswers {
   }
   /// See WorldQuery::is_finished().
   bool is_finished(std::size_t link) const { return !any_ || query_->is_finished(link); }
-  void set_influence_distance(double distance) { influence_distance_ = distance; }
   /// Another one whenever the objects are others, but not when they move with their frames; 0
   /// without a world.
   std::uint64_t key() const { return any_ ? key_ : 0; }
@@ -70,10 +69,9 @@ class WorldAnswers {
   std::unique_ptr<WorldQuery> query_;  ///< null before the first world
   std::vector<LinkProximity> answers_;
   std::vector<bool> is_nearest_;
-  std::vector<int> sources_;         ///< by world
-  std::vector<Motion> motions_;      ///< by world
-  double time_ = 0.0;                ///< [s] of the last run()
-  double influence_distance_ = 0.0;  ///< [m]
+  std::vector<int> sources_;     ///< by world
+  std::vector<Motion> motions_;  ///< by world
+  double time_ = 0.0;            ///< [s] of the last run()
   std::uint64_t key_ = 0;
   bool any_ = false;
 };

@@ -3,7 +3,6 @@
 #include <ros/console.h>
 
 #include <algorithm>
-#include <chrono>
 #include <exception>
 #include <optional>
 #include <string>

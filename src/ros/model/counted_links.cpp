@@ -10,8 +10,6 @@
 namespace ist {
 namespace {
 
-std::string quoted(const std::string& name) { return "'" + name + "'"; }
-
 /// The sentence about names in ~ignore_links that are no links.
 std::string unknown_ignored(const std::vector<std::string>& ignored,
                             const std::vector<std::string>& links) {
@@ -19,9 +17,8 @@ std::string unknown_ignored(const std::vector<std::string>& ignored,
   std::vector<std::string> sentences;
   for (const std::string& name : ignored) {
     if (known.count(name) > 0) continue;
-    const std::string nearest = nearest_name(name, known);
     sentences.push_back("~ignore_links names " + quoted(name) + ", which is no monitored link" +
-                        (nearest.empty() ? "" : "; did you mean " + quoted(nearest) + "?"));
+                        did_you_mean(name, known));
   }
   return join(sentences, "; ");
 }

@@ -34,20 +34,8 @@ ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)
   ModelState waiting;
   waiting.problem = waiting_for_description();
   set_state(std::move(waiting));
-  refining_thread_ = std::thread(&ModelLoader::run_refinement, this);
-}
-
-ModelLoader::~ModelLoader() {
-  stop();
-  refining_thread_.join();
-}
-
-void ModelLoader::stop() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    stop_ = true;
-  }
-  wake_.notify_all();
+  refining_thread_.start(
+      "ist packing", [this] { refine(); }, true);
 }
 
 std::shared_ptr<const ModelState> ModelLoader::state() const {

@@ -4,17 +4,16 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "internal/geometry/cancelled.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "ros/common/callback_thread.h"
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
 
@@ -22,20 +21,19 @@ namespace ist {
 
 /// Makes the robot's model: it waits for robot_description on the parameter server, reads the URDF,
 /// and packs its links coarsely or takes them from the cache. After a text that is no URDF it reads
-/// again as soon as the parameter changes. A thread of its own, of low
-/// priority, measures the distance fields of all links, and packs finely those that need it. All
-/// members are thread safe.
+/// again as soon as the parameter changes. A thread of its own, of low priority, measures the
+/// distance fields of all links, and packs finely those that need it. All members are thread safe.
 class ModelLoader {
  public:
   /// @param nh  namespace in which, and above which, `config.robot_description` is searched
   ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh);
-  ~ModelLoader();
+  ~ModelLoader() { stop(); }
 
   /// Loads the model where that is due. It is called again and again by one thread, which it takes
   /// as long as the model does.
   void load_when_due();
   /// Ends loading and packing, now and from now on.
-  void stop();
+  void stop() { stop_ = true; }
 
   std::shared_ptr<const ModelState> state() const;
 
@@ -59,7 +57,7 @@ class ModelLoader {
   std::string detach(const std::string& name);
 
   /// Ends attach() and detach(), now and from now on.
-  void end_changes();
+  void end_changes() { changes_ended_ = true; }
 
  private:
   void load_once();
@@ -84,7 +82,7 @@ class ModelLoader {
   void finish(const RobotDescription& description, ModelState* state) const;
   RobotDescription carry_over_objects(ModelState* state);
   void set_state(ModelState state);
-  void run_refinement();
+  void refine();
   bool refine_once();
   bool needs_final_packing(const ModelState& state, std::size_t link) const;
   std::optional<std::size_t> link_to_refine(const ModelState& state) const;
@@ -98,7 +96,6 @@ class ModelLoader {
   std::chrono::steady_clock::time_point next_load_;  ///< the same
 
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
   std::shared_ptr<const ModelState> state_;
   std::atomic<bool> stop_{false}, reload_{false};
   std::vector<AttachedObject> objects_;  ///< guarded by mutex_
@@ -110,7 +107,7 @@ class ModelLoader {
 
   std::vector<std::shared_ptr<const ModelState>> retired_;  ///< the refining thread's own
 
-  std::thread refining_thread_;
+  CallbackThread refining_thread_;
 };
 
 }  // namespace ist

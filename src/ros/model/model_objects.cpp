@@ -34,8 +34,6 @@ std::string not_attached(const std::string& name, const std::vector<AttachedObje
 
 }  // namespace
 
-void ModelLoader::end_changes() { changes_ended_ = true; }
-
 bool ModelLoader::change_cancelled() const {
   return cancelled() || changes_ended_ || change_revoked_ ||
          std::chrono::steady_clock::now() > change_deadline_;

@@ -1,26 +1,18 @@
 #include <ros/console.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "ros/common/exceptions.h"
 #include "ros/common/memory.h"
-#include "ros/common/thread_name.h"
 #include "ros/model/model_loader.h"
 
 // Background work on the model: distance fields, coarse ones of all links first, and then final
 // packings of the links that need them, one link at a time.
 
 namespace ist {
-namespace {
-
-constexpr std::chrono::milliseconds kPollNeed(200);
-
-}  // namespace
 
 /// Contact volumes and the depth of link pairs are as good as the spheres; distances are exact with
 /// any.
@@ -45,25 +37,14 @@ std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) 
   return chosen;
 }
 
-/// Runs in a thread of its own. Models that have been replaced are freed here, not in the cycle.
-void ModelLoader::run_refinement() {
-  name_thread("ist packing");
-  lower_thread_priority();
-  while (!stop_) {
-    bool is_finer = false;
-    const std::string fault = exception_of([this, &is_finer] {
-      while (!stop_ && refine_once()) is_finer = true;
-    });
-    if (!fault.empty()) {
-      ROS_ERROR_STREAM_THROTTLE(5.0, "a link is not packed more finely: " << fault);
-    }
-    retired_.erase(std::remove_if(retired_.begin(), retired_.end(),
-                                  [](const auto& state) { return state.use_count() == 1; }),
-                   retired_.end());
-    if (is_finer) return_free_memory();  // packing needs some megabytes
-    std::unique_lock<std::mutex> lock(mutex_);
-    wake_.wait_for(lock, kPollNeed, [this] { return stop_.load(); });
-  }
+/// Models that have been replaced are freed here, not in the cycle.
+void ModelLoader::refine() {
+  retired_.erase(std::remove_if(retired_.begin(), retired_.end(),
+                                [](const auto& state) { return state.use_count() == 1; }),
+                 retired_.end());
+  bool is_finer = false;
+  while (!stop_ && refine_once()) is_finer = true;
+  if (is_finer) return_free_memory();  // packing needs some megabytes
 }
 
 /// @returns false where there is nothing to do

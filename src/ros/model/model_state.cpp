@@ -32,9 +32,7 @@ std::string unmonitored_name(const std::vector<std::string>& names, const ModelS
   const std::set<std::string> known(model.links.begin(), model.links.end());
   for (const std::string& name : names) {
     if (known.count(name) > 0) continue;
-    const std::string nearest = nearest_name(name, known);
-    return "'" + printable(name) + "' is no monitored link" +
-           (nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
+    return quoted(printable(name)) + " is no monitored link" + did_you_mean(name, known);
   }
   return "";
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -12,10 +13,27 @@
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/model/link_choice.h"
-#include "ros/model/link_usage.h"
 #include "ros/parameters/parameters.h"
 
 namespace ist {
+
+/// The links that something has come near, which need final packings and contact volumes. The cycle
+/// writes it, background threads read it, and neither waits.
+class LinkUsage {
+ public:
+  explicit LinkUsage(std::size_t links) : was_near_(links) {}
+
+  /// Notes that something is within the influence distance of a link.
+  void note_near(std::size_t link) { was_near_[link].store(true, std::memory_order_relaxed); }
+
+  /// Whether something has been within the influence distance at any time.
+  bool was_near(std::size_t link) const { return was_near_[link].load(std::memory_order_relaxed); }
+
+  std::size_t size() const { return was_near_.size(); }
+
+ private:
+  std::vector<std::atomic<bool>> was_near_;
+};
 
 /// The robot's model, or how far its loading is. Immutable once it is shared.
 struct ModelState {

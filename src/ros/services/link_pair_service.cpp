@@ -3,20 +3,15 @@
 #include <ros/console.h>
 
 #include <algorithm>
-#include <chrono>
 
 #include "internal/proximity/pair_samples_cache.h"
 #include "ist_proximity/proximity/collision_rules.h"
-#include "ros/common/exceptions.h"
 #include "ros/common/text.h"
-#include "ros/common/thread_name.h"
 
 namespace ist {
 namespace {
 
 using PairMessage = ist_proximity::LinkPair;
-
-constexpr std::chrono::milliseconds kPollModel(200);
 
 // What was found of a pair; null: it was not sampled.
 const SampledPair* find(const std::vector<SampledPair>& sampled, const LinkPair& pair) {
@@ -48,27 +43,14 @@ LinkPairService::LinkPairService(ros::NodeHandle private_nh, const ServerConfig&
                                  const ModelLoader& loader)
     : config_(config), loader_(loader) {
   service_ = private_nh.advertiseService("link_pairs", &LinkPairService::answer, this);
-  thread_ = std::thread(&LinkPairService::run, this);
+  thread_.start(
+      "ist sampling", [this] { sample_newest(); }, true);
 }
 
-LinkPairService::~LinkPairService() {
-  stop_signal_.stop();
-  thread_.join();
-}
-
-void LinkPairService::run() {
-  name_thread("ist sampling");
-  lower_thread_priority();
-  std::shared_ptr<const ModelState> model;
-  while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPollModel)) {
-    if (model && !is_outdated(*model)) continue;
-    model = loader_.state();
-    const std::string fault = exception_of([&] { sample_newest(model); });
-    if (!fault.empty()) ROS_ERROR_STREAM("link pairs are not listed: " << fault);
-  }
-}
-
-void LinkPairService::sample_newest(const std::shared_ptr<const ModelState>& model) {
+void LinkPairService::sample_newest() {
+  if (model_ && !is_outdated(*model_)) return;
+  model_ = loader_.state();
+  const auto model = model_;
   if (!model->is_ready() || !model->kinematics) return;
   Findings findings;
   findings.model = model;
@@ -86,7 +68,7 @@ void LinkPairService::sample_newest(const std::shared_ptr<const ModelState>& mod
 /// Finer packings change nothing here.
 bool LinkPairService::is_outdated(const ModelState& model) const {
   const auto newest = loader_.state();
-  return stop_signal_.stopped() || (newest.get() != &model && !is_refinement(model, *newest));
+  return !thread_.is_running() || (newest.get() != &model && !is_refinement(model, *newest));
 }
 
 void LinkPairService::sample(Findings* findings) {

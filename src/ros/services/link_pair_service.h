@@ -6,11 +6,10 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "ist_proximity/proximity/self_query.h"
-#include "ros/common/stop_signal.h"
+#include "ros/common/callback_thread.h"
 #include "ros/model/model_loader.h"
 #include "ros/parameters/parameters.h"
 #include "ros/services/pair_choice.h"
@@ -25,7 +24,6 @@ class LinkPairService {
   /// @param loader  outlives this
   LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config,
                   const ModelLoader& loader);
-  ~LinkPairService();
 
  private:
   using Service = ist_proximity::ListLinkPairs;
@@ -38,8 +36,7 @@ class LinkPairService {
     std::string problem;               ///< why there are no samples
   };
 
-  void run();
-  void sample_newest(const std::shared_ptr<const ModelState>& model);
+  void sample_newest();
   void sample(Findings* findings);
   static std::string left_out_though_apart(const Findings& findings);
   bool is_outdated(const ModelState& model) const;
@@ -47,11 +44,11 @@ class LinkPairService {
 
   const ServerConfig config_;
   const ModelLoader& loader_;
-  StopSignal stop_signal_;
+  std::shared_ptr<const ModelState> model_;   ///< of the last sampling; the thread's own
   std::mutex mutex_;                          ///< guards the next one
   std::shared_ptr<const Findings> findings_;  ///< null before the first model
   ros::ServiceServer service_;
-  std::thread thread_;
+  CallbackThread thread_;
 };
 
 }  // namespace ist

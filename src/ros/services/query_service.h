@@ -4,9 +4,7 @@
 #include <ros/node_handle.h>
 
 #include <chrono>
-#include <cstddef>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 

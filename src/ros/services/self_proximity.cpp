@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/make_shared.hpp>
 #include <chrono>
-#include <cmath>
 
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/repulsion/self_repulsion.h"

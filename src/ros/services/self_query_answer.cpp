@@ -1,7 +1,6 @@
 #include "ros/services/self_query_answer.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "internal/geometry/numbers.h"
 #include "ros/output/message_conversion.h"

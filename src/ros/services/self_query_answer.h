@@ -1,10 +1,8 @@
 #pragma once
 
 #include <ist_proximity/QueryProximity.h>
-#include <ros/node_handle.h>
 
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "ist_proximity/proximity/time_of_self_impact.h"

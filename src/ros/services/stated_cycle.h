@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist_proximity/ProximityArray.h>
-#include <ros/time.h>
 #include <sensor_msgs/JointState.h>
 
 #include <memory>
