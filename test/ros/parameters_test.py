@@ -47,7 +47,7 @@ WRONG = [
             "robot_description": "",
             "cache_directory": 7,
             "pose_source": "joint_state",
-            "self_collision": {"enabled": 1, "ignore": [["a", "b"], ["c"]]},
+            "self_collision": {"enabled": 1},
             "self_filter": "yes",
         },
         [
@@ -58,7 +58,6 @@ WRONG = [
             "~cache_directory",
             '~pose_source is "joint_state": allowed is tf, joint_states',
             "~self_collision/enabled is 1: true or false is needed",
-            "~self_collision/ignore is a list of 1: a list of pairs of strings is needed",
             "~self_filter",
         ],
     ),

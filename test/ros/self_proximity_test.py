@@ -171,20 +171,13 @@ class SelfProximityTest(unittest.TestCase):
             world.stop()
 
     def test_left_out(self):
-        for case, parameters in {
-            "by_list": {"self_collision/ignore": [["ball_link", "box_link"]]},
-            "by_srdf": {},
-            "by_default": {},
-        }.items():
-            if case != "by_list":
-                srdf = SRDF if case == "by_srdf" else SRDF_DEFAULT
-                rospy.set_param("/self_%s/robot_description_semantic" % case, srdf)
+        for case, srdf in (("by_srdf", SRDF), ("by_default", SRDF_DEFAULT)):
+            rospy.set_param("/self_%s/robot_description_semantic" % case, srdf)
             with self.subTest(case):
-                node = self.start(case, **parameters)
+                node = self.start(case)
                 message = node.wait_for_status(ProximityArray.OK)
                 self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
-                reason = LinkPair.IGNORED if case == "by_list" else LinkPair.SRDF
-                self.assertEqual([pair.reason for pair in self.link_pairs().pairs], [reason])
+                self.assertEqual([pair.reason for pair in self.link_pairs().pairs], [LinkPair.SRDF])
                 if case != "by_default":
                     self.tearDown()
 

@@ -135,6 +135,8 @@ TEST(WorldParameters, MistakesAreNamed) {
                "wall/margin is -1 m");
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["odd"] = 3; }),
                "~sources/cell/objects/odd is 3: a dictionary is needed");
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["allowed_contacts"] = 3; }),
+               "a list of pairs of strings is needed");
   EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["file"] = "cell.scene"; }),
                "an absolute path is needed");
   EXPECT_PRED2(has, error_of([](auto* cell) {

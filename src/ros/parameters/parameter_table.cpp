@@ -23,6 +23,7 @@ namespace {
 // - IngestConfig::max_points, OctreeLimits and WorldLimits are more than any sensor, map or cell
 // has;
 //   they keep a broken message from taking the memory.
+// - A pair of links that is not to be watched is one that an SRDF disables.
 // - kAttachTime and SelfCollisionConfig::kRate are what a pick and a controller need.
 // - TrajectoryConfig::tolerance: a robot that is farther off does not follow.
 // - SeparationConfig::intrusion: ~query/margin is taken off the same bounds.
@@ -113,8 +114,6 @@ std::vector<Parameter> answer_parameters(ServerConfig* config) {
           "Links with a contact wrench; auto: those within repulsion/influence_distance so far."),
       row("self_collision/enabled", &self.enabled,
           "Distances from link to link, on ~self_proximity."),
-      row("self_collision/ignore", &self.ignore,
-          "Pairs to leave out, [[a, b], [c, d]], besides neighbours and what an SRDF disables."),
       row("self_collision/in_minimum", &self.in_minimum,
           "They count in ~min_distance, ~speed_scale and ~joint_repulsion."),
       row("joint_deceleration/default", &config->deceleration.other,

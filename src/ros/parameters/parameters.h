@@ -34,8 +34,6 @@ enum class PoseSourceKind { kTf, kJointStates };
 struct SelfCollisionConfig {
   static constexpr double kRate = 50.0;  ///< [Hz] of ~self_proximity
   bool enabled = false;
-  std::vector<std::pair<std::string, std::string>>
-      ignore;  ///< pairs of links to leave out, besides adjacent ones
   /// Its links count in ~min_distance, ~speed_scale and ~joint_repulsion.
   bool in_minimum = false;
 };

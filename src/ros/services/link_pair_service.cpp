@@ -54,7 +54,7 @@ void LinkPairService::sample_newest() {
   if (!model->is_ready() || !model->kinematics) return;
   Findings findings;
   findings.model = model;
-  findings.chosen = choose_pairs(config_, model, [&] { return is_outdated(*model); }).all;
+  findings.chosen = choose_pairs(model, [&] { return is_outdated(*model); }).all;
   findings.problem = "the pairs are being sampled";
   const auto show = [&] {
     const std::lock_guard<std::mutex> lock(mutex_);

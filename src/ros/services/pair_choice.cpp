@@ -17,18 +17,6 @@ bool holds(const std::vector<LinkPair>& pairs, const LinkPair& pair) {
       });
 }
 
-std::vector<std::string> unknown_names(const ServerConfig& config, const Kinematics& kinematics) {
-  std::vector<std::string> warnings;
-  for (const auto& pair : config.self_collision.ignore) {
-    for (const std::string& name : {pair.first, pair.second}) {
-      if (kinematics.find_body(name)) continue;
-      warnings.push_back("~self_collision/ignore names '" + name +
-                         "', which is no link of the URDF");
-    }
-  }
-  return warnings;
-}
-
 }  // namespace
 
 std::vector<LinkPair> PairChoice::watched() const {
@@ -52,36 +40,30 @@ std::string PairChoice::text(const RobotModel& robot) const {
   }
   return "self-collision: " + count(PairReason::kWatched) +
          " pairs of links are watched; left out: " + count(PairReason::kAdjacent) + " adjacent, " +
-         count(PairReason::kIgnored) + " by ~self_collision/ignore, " + count(PairReason::kSrdf) +
-         " by the SRDF, " + count(PairReason::kUnusable) + " of unusable geometry, " +
-         count(PairReason::kAtRest) + " in contact at rest" + (at_rest.empty() ? "" : ": ") +
-         join(at_rest, ", ");
+         count(PairReason::kSrdf) + " by the SRDF, " + count(PairReason::kUnusable) +
+         " of unusable geometry, " + count(PairReason::kAtRest) + " in contact at rest" +
+         (at_rest.empty() ? "" : ": ") + join(at_rest, ", ");
 }
 
-PairChoice choose_pairs(const ServerConfig& config,
-                        const std::shared_ptr<const ModelState>& monitoring,
+PairChoice choose_pairs(const std::shared_ptr<const ModelState>& monitoring,
                         const std::function<bool()>& cancelled) {
   const auto with_hulls = with_paired(monitoring);
   const ModelState& model = *with_hulls;
   PairChoice choice;
   const RobotModel& robot = *model.robot;
-  choice.warnings = unknown_names(config, *model.kinematics);
   const CollisionRules& rules = *model.rules;
   CollisionRules only_enabled;  // which may be of adjacent links
   only_enabled.enabled = rules.enabled;
   const std::vector<bool> wanted = wanted_links(model);
-  const auto pairs_by = [&](const NamePairs& ignored, const CollisionRules& by) {
-    return self_collision_pairs(robot, *model.kinematics, wanted, ignored, by);
+  const auto pairs_by = [&](const CollisionRules& by) {
+    return self_collision_pairs(robot, *model.kinematics, wanted, {}, by);
   };
-  const std::vector<LinkPair> candidates = pairs_by({}, only_enabled);
-  const std::vector<LinkPair> not_ignored = pairs_by(config.self_collision.ignore, only_enabled);
-  const std::vector<LinkPair> left = pairs_by(config.self_collision.ignore, rules);
+  const std::vector<LinkPair> candidates = pairs_by(only_enabled), left = pairs_by(rules);
   const std::vector<LinkPair> at_rest =
       in_contact_at_rest(model.robot, *model.kinematics, left, cancelled);
   const auto reason_of = [&](const LinkPair& pair) {
     if (!wanted[pair.first] || !wanted[pair.second]) return PairReason::kUnusable;
     if (!holds(candidates, pair)) return PairReason::kAdjacent;
-    if (!holds(not_ignored, pair)) return PairReason::kIgnored;
     if (!holds(left, pair)) return PairReason::kSrdf;
     const bool is_stated =
         rules.enables(robot.links[pair.first].name, robot.links[pair.second].name);

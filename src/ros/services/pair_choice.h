@@ -7,12 +7,11 @@
 
 #include "ist_proximity/proximity/self_query.h"
 #include "ros/model/model_state.h"
-#include "ros/parameters/parameters.h"
 
 namespace ist {
 
 /// Why a pair of links is watched or left out; the values are those of LinkPair.msg.
-enum class PairReason { kWatched, kAdjacent, kIgnored, kSrdf, kAtRest, kUnusable };
+enum class PairReason { kWatched, kAdjacent, kSrdf = 3, kAtRest, kUnusable };
 
 struct ChosenPair {
   LinkPair pair;
@@ -22,7 +21,6 @@ struct ChosenPair {
 /// Decides about every pair of links of ~self_proximity, see with_paired().
 struct PairChoice {
   std::vector<ChosenPair> all;
-  std::vector<std::string> warnings;  ///< one sentence each
 
   std::vector<LinkPair> watched() const;
   std::string text(const RobotModel& robot) const;  ///< a sentence for the log
@@ -31,8 +29,7 @@ struct PairChoice {
 /// @param monitoring  the model: ready, with kinematics
 /// @param cancelled  asked now and then; true ends the work, whose result is of no use then. May be
 ///                   empty
-PairChoice choose_pairs(const ServerConfig& config,
-                        const std::shared_ptr<const ModelState>& monitoring,
+PairChoice choose_pairs(const std::shared_ptr<const ModelState>& monitoring,
                         const std::function<bool()>& cancelled = {});
 
 }  // namespace ist

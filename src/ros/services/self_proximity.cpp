@@ -103,8 +103,7 @@ void SelfProximity::take_model() {
 }
 
 std::vector<LinkPair> SelfProximity::watched_pairs() const {
-  const PairChoice choice = choose_pairs(config_, model_, is_stopped_);
-  for (const std::string& warning : choice.warnings) ROS_WARN_STREAM(warning);
+  const PairChoice choice = choose_pairs(model_, is_stopped_);
   ROS_INFO_STREAM(choice.text(*model_->robot));
   return choice.watched();
 }

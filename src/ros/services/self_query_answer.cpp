@@ -22,8 +22,8 @@ void SelfQueryAnswer::set_model(const std::shared_ptr<const ModelState>& model) 
 
 void SelfQueryAnswer::choose(const std::vector<bool>& chosen) {
   if (!query_) {
-    query_ = std::make_unique<SelfQuery>(model_->robot, choose_pairs(config_, model_).watched(),
-                                         config_.query);
+    query_ =
+        std::make_unique<SelfQuery>(model_->robot, choose_pairs(model_).watched(), config_.query);
   }
   // A link that is not monitored cannot be asked for: its pairs are among all.
   const bool all = std::find(chosen.begin(), chosen.end(), false) == chosen.end();
