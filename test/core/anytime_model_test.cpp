@@ -163,12 +163,10 @@ TEST(AnytimeModel, fieldsOfAllLinksAreMeasuredWhereTheyAreAskedFor) {
   const std::vector<LinkGeometry> links = {test::one(Sphere{0.1}), test::one(Box{{0.1, 0.2, 0.3}})};
   RobotModelConfig config = config_to(kMaxError);
   config.distance_fields = true;
-  for (const LinkModel& link : build_robot_model(*robot_of(links), config)->links) {
-    EXPECT_NE(link.field, nullptr);
-  }
-  for (const LinkModel& link : build_robot_model(*robot_of(links), config_to(kMaxError))->links) {
-    EXPECT_EQ(link.field, nullptr);
-  }
+  const auto with_fields = build_robot_model(*robot_of(links), config);
+  for (const LinkModel& link : with_fields->links) EXPECT_NE(link.field, nullptr);
+  const auto without_fields = build_robot_model(*robot_of(links), config_to(kMaxError));
+  for (const LinkModel& link : without_fields->links) EXPECT_EQ(link.field, nullptr);
 }
 
 // Only final packings are kept, and a start with a full cache has them at once.

@@ -84,7 +84,10 @@ TEST(ClosedLoop, TheFilterDrivesIntoNothing) {
     const ClosedLoopResult seeing = run_closed_loop(robot, test::demo_model(), scene, seed, config);
     EXPECT_GT(seeing.smallest_distance, 0.0) << "seed " << seed << ": " << seeing.link;
   }
-  EXPECT_GT(collisions, 0);
+  // The single scene of a sanitizer's run need not have a collision.
+  if (!test::kSanitized) {
+    EXPECT_GT(collisions, 0);
+  }
 }
 
 // The arm, folded below its base, swings its gripper through its stand.
