@@ -30,7 +30,7 @@ std::string because(const std::string& problem) {
   return problem.empty() ? std::string() : ": " + problem;
 }
 
-/// Of a source without a topic, or whose topic is not the reason.
+/// The status of a source without a topic, or whose topic is not the reason.
 Status without_topic(const SourceReport& source, const std::string& text) {
   return {ProximityArray::NO_CLOUD, "source '" + source.name + "': " + text};
 }
