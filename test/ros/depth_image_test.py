@@ -155,12 +155,13 @@ class DepthImageTest(unittest.TestCase):
             )
         self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
 
-    def test_baseline(self):
-        """Gazebo's hackBaseline."""
+    def test_baseline_and_unit(self):
+        """Gazebo's hackBaseline, and a camera that counts tenths of a millimetre."""
         self.info = camera_info(P=P[:3] + [-0.07 * FOCAL_LENGTH] + P[4:])
-        self.start()
+        self.start(depth_scale=1e-4)
+        tenths = 10 * depths()
         seen = pt.apply(X_BASE_CAMERA, points(depths()) + [0.07, 0, 0])
-        with self.stream(lambda: image(depths())):
+        with self.stream(lambda: image(tenths)):
             answer = self.node.wait_for_status(ProximityArray.OK)
         truth = pt.distance_to_ball(seen).min()
         self.assertAlmostEqual(pt.link(answer, "ball_link").distance, truth, 5)
@@ -192,14 +193,14 @@ class DepthImageTest(unittest.TestCase):
     def test_camera_info(self):
         """Without a CameraInfo nothing is known, and the text says where one is expected."""
         self.info = None
-        self.start("depth/camera_info")
+        self.start("elsewhere/info", camera_info="elsewhere/info")
         with self.stream(lambda: image(depths())):
             message = self.node.wait_for_status(
-                ProximityArray.NO_CLOUD, self.namespace + "/depth/camera_info; remap"
+                ProximityArray.NO_CLOUD, self.namespace + "/elsewhere/info; set ~sources/depth/"
             )
         self.assertTrue(pt.all_unknown(message))
         self.info = camera_info(D=[0.1, 0.0, 0.0, 0.0, 0.0])
-        self.world.repeat(10, lambda: self.infos["depth/camera_info"].publish(self.info))
+        self.world.repeat(10, lambda: self.infos["elsewhere/info"].publish(self.info))
         self.check_wall()
         # Lens distortion: the image must be rectified. It is used, and said once.
         self.node.wait_until(

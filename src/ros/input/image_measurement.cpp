@@ -58,7 +58,8 @@ void DepthCamera::take(const sensor_msgs::CameraInfo& message) {
 /// Why images cannot be used; empty when they can.
 std::string DepthCamera::fault(const std::string& frame_id) const {
   if (!has_come_) {
-    return "no sensor_msgs/CameraInfo has come on " + topic_ + "; remap that to its topic";
+    return "no sensor_msgs/CameraInfo has come on " + topic_ + "; set ~sources/" + config_.name +
+           "/camera_info to its topic";
   }
   if (!fault_.empty()) return "malformed camera_info on " + topic_ + ": " + fault_;
   const std::string frame = without_slash(newest_.header.frame_id);
@@ -81,6 +82,7 @@ Measurement DepthCamera::read(const sensor_msgs::ImageConstPtr& message) const {
   image.is_bigendian = message->is_bigendian != 0;
   image.data = message->data.data();
   image.data_size = message->data.size();
+  image.unit = config_.depth_unit;
   RawCloud raw;
   fault = check_depth_image(image, rays_, &raw);
   if (!fault.empty()) return faulty(header, "malformed image: " + fault);

@@ -225,8 +225,9 @@ std::vector<ros::Subscriber> subscribe(const SourceConfig& config, ros::NodeHand
   }
   // By ROS' convention the CameraInfo is beside the images.
   const std::string images = nh->resolveName(config.topic);
-  const std::string topic =
-      nh->resolveName(images.substr(0, images.rfind('/') + 1) + "camera_info");
+  const std::string topic = config.camera_info.empty()
+                                ? images.substr(0, images.rfind('/') + 1) + "camera_info"
+                                : nh->resolveName(config.camera_info);
   const auto camera = std::make_shared<DepthCamera>(config, topic, noise);
   const boost::function<void(const sensor_msgs::CameraInfoConstPtr&)> take =
       [camera](const sensor_msgs::CameraInfoConstPtr& message) { camera->take(*message); };

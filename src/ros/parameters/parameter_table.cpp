@@ -15,20 +15,18 @@ namespace {
 // - RepulsionConfig::filter_time hides the step of a new cloud, and delays nothing else.
 // - SpeedScaleConfig: slow_distance, as a line is what controllers expect; self_stop_distance and
 //   self_free_distance, as distances from link to link have no noise and fit every arm.
-// - SeparationConfig::uncertainty adds to intrusion, ExtentConfig::footprint_radius to calibration.
+// - ExtentConfig::footprint_radius adds to calibration.
 // - ExtentConfig::sigmas: bounds are to hold; speed: a walking person's, as in ISO 13855.
 // - ViewFilterConfig: errors of a calibrated camera; the filter finds the rest, and tells doubts.
 // - MemoryConfig::max_range: farther rays cost time, and reach no arm.
 // - IngestConfig::sensor_range and kMinMeasured tell a broken sensor, not how good it is.
-// - IngestConfig::max_points, OctreeLimits and WorldLimits are more than any sensor, map or cell
-// has;
-//   they keep a broken message from taking the memory.
+// - IngestConfig::max_points, OctreeLimits and WorldLimits keep a broken message from taking the
+//   memory; no sensor, map or cell has as many.
 // - A pair of links that is not to be watched is one that an SRDF disables.
 // - kAttachTime and SelfCollisionConfig::kRate are what a pick and a controller need.
 // - TrajectoryConfig::tolerance: a robot that is farther off does not follow.
-// - SeparationConfig::intrusion: ~query/margin is taken off the same bounds.
+// - SeparationConfig::intrusion and uncertainty: ~query/margin is taken off the same bounds.
 // - NoiseFilterConfig::neighbors: a larger radius stands for fewer of them.
-// - The unit of a depth image is that of REP 118, and its CameraInfo is beside it: remap either.
 // - ExtentConfig::calibration_angle is a sensor model's own; a mounting's error is calibration.
 // - PenetrationConfig::stiffness scales all wrenches alike, as a reader can.
 // - kMostAttached: each object is packed, and measured by every query.
@@ -307,6 +305,13 @@ std::vector<Parameter> source_parameters(const std::string& at, SourceConfig* so
         row(at + "timeout", &source->timeout, kTime, timeout_help),
         row(at + "required", &source->required,
             "false: its absence shows in its own status only, while another source measures.")};
+  }
+  if (type == SourceType::kDepthImage) {
+    append({row(at + "camera_info", &source->camera_info,
+                "Topic of its sensor_msgs/CameraInfo. Default: camera_info beside topic."),
+            row(at + "depth_scale", &source->depth_unit, {"m", 0.0, 1.0},
+                "Of a number of 1; 0: that of the encoding.")},
+           &table);
   }
   if (type == SourceType::kMap) {
     append(map_parameters(at, source), &table);

@@ -66,6 +66,7 @@ struct SourceConfig {
   std::string name = "cloud";
   SourceType type = SourceType::kCloud;
   std::string topic = "cloud";   ///< as configured: relative to the node's namespace, remappable
+  std::string camera_info;       ///< topic, of depth images; empty: camera_info beside `topic`
   std::string file;              ///< absolute path of a map that is read in place of a topic
   std::string frame_id = "map";  ///< frame of the map in `file`
   double timeout = 0.5;          ///< [s] an older message is STALE_CLOUD; > 0, may be inf
@@ -74,6 +75,7 @@ struct SourceConfig {
   /// [s] > 0: a source whose messages have held the same bytes for longer is STALE_CLOUD. Infinity:
   /// never, as a simulation without noise repeats itself.
   double frozen_after = std::numeric_limits<double>::infinity();
+  double depth_unit = 0.0;  ///< [m] of depth images: that a number of 1 means; 0: the encoding's
   IngestConfig ingest;
   /// [m] self_filter_padding by link, where it is a dictionary; of other links `other_padding`.
   /// Used with kPadding. ingest.self_filter_padding is the largest.
