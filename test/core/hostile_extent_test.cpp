@@ -269,6 +269,30 @@ TEST(HostileExtent, WhatIsKeptOfABoxHoldsBeyondTheRange) {
   }
 }
 
+// The same where the nearest point, which has no extent, is another one at both poses, so that
+// nothing but the bound that is kept says how near the box is.
+TEST(HostileExtent, WhatIsKeptOfABoxHoldsWhereAPointIsNearer) {
+  const auto model = test::make_model({Box{{0.2, 0.2, 0.2}}}, 0.05);
+  QueryConfig config;
+  config.max_distance = 1.0;
+  std::vector<LinkProximity> results;
+  const CloudSnapshot point = test::make_snapshot({{0.0, 1.44, 0.0}}, Eigen::Vector3d::Zero());
+  for (int i = 1; i < 80; ++i) {
+    const double distance = 1.45 + 0.001 * i;
+    CloudSnapshot map = test::make_map({Eigen::AlignedBox3d(
+        Eigen::Vector3d(0.1 + distance, -0.1, -0.1), Eigen::Vector3d(0.2 + distance, 0.1, 0.1))});
+    map.box_extent = 0.45;
+    ProximityQuery query(model, config);
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    for (const double x : {0.0, 0.1}) {
+      X_FL.translation().x() = x;
+      ASSERT_TRUE(query.run(Poses{X_FL}, {true}, {&map, &point}, &results));
+      ASSERT_LE(results[0].lower_bound, distance - x - map.box_extent + 1e-6)
+          << distance << ", " << x;
+    }
+  }
+}
+
 // The angle of a pixel is known with the first message. A few very wide pixels before a short range
 // make radii that are small enough, and grow faster than the range: no bound could hold then.
 TEST(HostileExtent, AFootprintThatGrowsTooFastIsRefused) {
