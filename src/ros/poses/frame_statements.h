@@ -15,10 +15,9 @@ namespace ist {
 
 /// A node that states transforms.
 struct TransformPublisher {
-  TransformPublisher(std::string name_of_node)
-      : name(std::move(name_of_node)) {}                                // NOLINT: a name will do
-  TransformPublisher(const char* name_of_node) : name(name_of_node) {}  // NOLINT: likewise
-  TransformPublisher(std::string name_of_node, const boost::shared_ptr<ros::M_string>& header)
+  TransformPublisher(const char* name_of_node) : name(name_of_node) {}  // NOLINT: a name will do
+  TransformPublisher(std::string name_of_node,                          // NOLINT: likewise
+                     const boost::shared_ptr<ros::M_string>& header = nullptr)
       : name(std::move(name_of_node)), connection(header), has_connection(header != nullptr) {}
 
   bool is_gone() const { return has_connection && connection.expired(); }

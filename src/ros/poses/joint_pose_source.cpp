@@ -179,9 +179,7 @@ bool JointPoseSource::look_up_in_tf(const std::string& parent, const std::string
   problem->text = with_cause(buffer_, parent, child, problem->text, &problem->explained);
   ros::Time stamp;
   Eigen::Isometry3d ignored;
-  std::string ignored_problem;
-  if (is_known(buffer_, parent, child, ros::Time(), &ignored_problem) &&
-      ist::look_up(buffer_, parent, child, ros::Time(), &ignored, &stamp).empty() &&
+  if (ist::look_up(buffer_, parent, child, ros::Time(), &ignored, &stamp).empty() &&
       stamp < instant && seconds_between(stamp, now) <= timeout_) {
     tf_is_behind_ = true;
   }

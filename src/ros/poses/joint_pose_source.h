@@ -27,12 +27,8 @@ namespace ist {
 /// instant at which both tf and the joints are known. The instant never goes back.
 class JointPoseSource : public KinematicPoseSource {
  public:
-  /// @param joints       feeds `buffer`; both outlive this
-  /// @param which        the joint states that look_up() uses
-  /// @param fixed_frame  frame F
-  /// @param links        names
-  /// @param wanted       by link: false leaves it unknown, without a problem
-  /// @param timeout      [s]
+  /// @param joints  feeds `buffer`; outlives this
+  /// @param which   the joint states that look_up() uses
   JointPoseSource(std::shared_ptr<const Kinematics> kinematics, JointStateListener* joints,
                   JointStateListener::Which which, const TransformBuffer& buffer,
                   const std::string& fixed_frame, const std::vector<std::string>& links,

@@ -3,6 +3,7 @@
 #include <ros/time.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -30,12 +31,27 @@ struct StampedLinkPoses : LinkPoses {
   std::vector<std::string> doubts;    ///< sentences on poses that are known, and hardly true
 
   /// Makes every link unknown, without a problem, at an instant that is not before the last stamp.
-  void reset(const ros::Time& now, std::size_t links);
+  void reset(const ros::Time& now, std::size_t links) {
+    stamp = std::max(stamp, now);
+    X_FL.resize(links, Eigen::Isometry3d::Identity());
+    known.assign(links, false);
+    problems.assign(links, PoseProblem());
+    doubts.clear();
+  }
   /// Gives every wanted link the same problem.
-  void set_problem(const std::vector<bool>& wanted, const PoseProblem& problem);
+  void set_problem(const std::vector<bool>& wanted, const PoseProblem& problem) {
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      if (wanted[i]) problems[i] = problem;
+    }
+  }
   /// Adds a sentence to `doubts`, once; empty: nothing.
-  void add_doubt(const std::string& doubt);
-  std::size_t count_known() const;
+  void add_doubt(const std::string& doubt) {
+    const bool is_new = std::find(doubts.begin(), doubts.end(), doubt) == doubts.end();
+    if (is_new && !doubt.empty()) doubts.push_back(doubt);
+  }
+  std::size_t count_known() const {
+    return static_cast<std::size_t>(std::count(known.begin(), known.end(), true));
+  }
 };
 
 /// A source of link poses: tf, or the node's own kinematics. Not thread safe; never waits.

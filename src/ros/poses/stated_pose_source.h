@@ -15,10 +15,6 @@ namespace ist {
 /// frame come from tf as they are now.
 class StatedPoseSource : public KinematicPoseSource {
  public:
-  /// @param buffer       outlives this
-  /// @param fixed_frame  frame F
-  /// @param links        names
-  /// @param timeout      [s] allowed age of transforms
   StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const TransformBuffer& buffer,
                    const std::string& fixed_frame, const std::vector<std::string>& links,
                    double timeout);

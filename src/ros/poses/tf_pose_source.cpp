@@ -18,21 +18,6 @@ TfPoseSource::TfPoseSource(const TransformBuffer& buffer, std::string fixed_fram
       wanted_(std::move(wanted)),
       timeout_(timeout) {}
 
-bool TfPoseSource::newest(std::size_t link, const ros::Time& now, ros::Time* stamp,
-                          PoseProblem* problem) {
-  const std::string& frame = frames_[link];
-  Eigen::Isometry3d ignored;
-  problem->text = ist::look_up(buffer_, fixed_frame_, frame, ros::Time(), &ignored, stamp);
-  if (problem->empty()) {
-    if (stamp->isZero()) return true;
-    const double age = seconds_between(buffer_.counts_from(fixed_frame_, frame, *stamp), now);
-    if (age <= timeout_) return true;
-    problem->text = too_old(fixed_frame_, frame, age, timeout_);
-  }
-  problem->text = with_cause(buffer_, fixed_frame_, frame, problem->text, &problem->explained);
-  return false;
-}
-
 void TfPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   const std::size_t n = frames_.size();
   const ros::Time last = poses->stamp;
@@ -45,7 +30,10 @@ void TfPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   stamps.assign(n, ros::Time());
   for (std::size_t i = 0; i < n; ++i) {
     if (!wanted_[i]) continue;
-    poses->known[i] = newest(i, now, &stamps[i], &poses->problems[i]);
+    PoseProblem& problem = poses->problems[i];
+    problem.text = look_up_newest(buffer_, fixed_frame_, frames_[i], now, timeout_, &poses->X_FL[i],
+                                  &stamps[i], &problem.explained);
+    poses->known[i] = problem.empty();
     if (poses->known[i] && !stamps[i].isZero()) instant = std::min(instant, stamps[i]);
   }
   poses->stamp = std::max(instant, last);

@@ -33,8 +33,6 @@ class TfPoseSource : public PoseSource {
 
  private:
   std::string find_prefixed_frame() const;
-  /// Finds the newest instant of one link; false and a sentence when there is none that is fresh.
-  bool newest(std::size_t link, const ros::Time& now, ros::Time* stamp, PoseProblem* problem);
 
   const TransformBuffer& buffer_;
   std::string fixed_frame_;

@@ -128,11 +128,7 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
   if (fault.empty()) fault = note(transform, publisher, is_static, now, &is_new);
   if (fault.empty() && is_new) {
     try {
-      if (setTransform(transform, publisher.name, is_static)) {
-        accept(without_slash(transform.child_frame_id));
-      } else {
-        fault = "is not used: tf refuses it";
-      }
+      if (!setTransform(transform, publisher.name, is_static)) fault = "is not used: tf refuses it";
     } catch (const std::exception& error) {
       fault = std::string("is not used: ") + error.what();
     }
@@ -152,17 +148,22 @@ std::string TransformBuffer::note(const geometry_msgs::TransformStamped& transfo
   if (!record) return format_text("is not used: there are %zu frames", kMaxFrames);
   change_statements([&](FrameStatements* all) { all->add(transform, publisher, is_static, now); },
                     record);
-  if (is_static) return "";
   const ros::Time& stamp = transform.header.stamp;
-  record->parent = without_slash(transform.header.frame_id);
-  *is_new = publisher.has_connection ? stamp != record->newest : stamp > record->newest;
   const double behind = seconds_between(stamp, record->newest);
-  if (!record->newest.isZero() && behind > getCacheLength().toSec()) {
+  if (!is_static && !record->newest.isZero() && behind > getCacheLength().toSec()) {
     return format_text(
         "is not used: its stamp is %.2f s behind that of another one; are there two publishers, "
         "with two clocks?",
         behind);
   }
+  if (record->is_refused_for_good()) {  // tf has another one now
+    record->refusal.clear();
+    record->refused_until = Clock::time_point();
+    --lasting_refusals_;
+  }
+  if (is_static) return "";
+  record->parent = without_slash(transform.header.frame_id);
+  *is_new = publisher.has_connection ? stamp != record->newest : stamp > record->newest;
   if (stamp <= record->newest) return "";
   record->newest = stamp;
   record->received = now;
@@ -203,17 +204,6 @@ std::string TransformBuffer::refuse(const geometry_msgs::TransformStamped& trans
   if (is_static) ++lasting_refusals_;
   record->refused_until = is_static ? Clock::time_point::max() : refused_until_.load();
   return last_refusal_;
-}
-
-/// Forgets why an earlier transform of a frame was refused for good, since tf has another now.
-void TransformBuffer::accept(const std::string& child) {
-  if (lasting_refusals_ == 0) return;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const auto record = records_.find(child);
-  if (record == records_.end() || !record->second.is_refused_for_good()) return;
-  record->second.refusal.clear();
-  record->second.refused_until = Clock::time_point();
-  --lasting_refusals_;
 }
 
 /// Changes what is said of a frame, counts the disputes, and gives tf the static transform that is
@@ -300,32 +290,34 @@ bool TransformBuffer::way_up(const std::string& end, const std::string& frame,
   return at == end;
 }
 
-/// The child frames of all transforms between two frames. The caller holds mutex_.
-std::vector<std::string> TransformBuffer::between(const std::string& fixed_frame,
-                                                  const std::string& frame) const {
+/// What is known of all transforms between two frames. The caller holds mutex_.
+std::vector<const TransformBuffer::Record*> TransformBuffer::between(
+    const std::string& fixed_frame, const std::string& frame) const {
   const std::string fixed = without_slash(fixed_frame), other = without_slash(frame);
   std::vector<std::string> way, from_fixed;
-  if (way_up(fixed, other, &way)) return way;
-  if (way_up(other, fixed, &from_fixed)) return from_fixed;
-  // The transforms above the frame that both are below do not matter.
-  while (!way.empty() && !from_fixed.empty() && way.back() == from_fixed.back()) {
-    way.pop_back();
-    from_fixed.pop_back();
+  if (!way_up(fixed, other, &way)) {
+    if (way_up(other, fixed, &from_fixed)) way.clear();
+    // The transforms above the frame that both are below do not matter.
+    while (!way.empty() && !from_fixed.empty() && way.back() == from_fixed.back()) {
+      way.pop_back();
+      from_fixed.pop_back();
+    }
   }
   way.insert(way.end(), from_fixed.begin(), from_fixed.end());
-  return way;
+  std::vector<const Record*> records;
+  for (const std::string& child : way) {
+    const auto record = records_.find(child);
+    if (record != records_.end()) records.push_back(&record->second);
+  }
+  return records;
 }
 
 std::string TransformBuffer::why_refused(const std::string& fixed, const std::string& frame) const {
   const auto now = Clock::now();
   if (now >= refused_until_.load() && lasting_refusals_ == 0) return "";
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (const std::string& child : between(fixed, frame)) {
-    const auto record = records_.find(child);
-    if (record != records_.end() && now < record->second.refused_until &&
-        !record->second.refusal.empty()) {
-      return record->second.refusal;
-    }
+  for (const Record* record : between(fixed, frame)) {
+    if (now < record->refused_until && !record->refusal.empty()) return record->refusal;
   }
   return "";
 }
@@ -333,10 +325,8 @@ std::string TransformBuffer::why_refused(const std::string& fixed, const std::st
 std::string TransformBuffer::dispute(const std::string& fixed, const std::string& frame) const {
   if (disputes_ == 0) return "";
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (const std::string& child : between(fixed, frame)) {
-    const auto record = records_.find(child);
-    if (record == records_.end()) continue;
-    const std::string& dispute = record->second.statements.dispute();
+  for (const Record* record : between(fixed, frame)) {
+    const std::string& dispute = record->statements.dispute();
     if (!dispute.empty()) return dispute;
   }
   return "";
@@ -347,10 +337,8 @@ ros::Time TransformBuffer::counts_from(const std::string& fixed, const std::stri
   const std::lock_guard<std::mutex> lock(mutex_);
   ros::Time from = stamp;
   if (!any_ahead_) return from;
-  for (const std::string& child : between(fixed, frame)) {
-    const auto record = records_.find(child);
-    if (record == records_.end() || record->second.ahead <= kClockResolution) continue;
-    from = std::min(from, record->second.received);
+  for (const Record* record : between(fixed, frame)) {
+    if (record->ahead > kClockResolution) from = std::min(from, record->received);
   }
   return from;
 }

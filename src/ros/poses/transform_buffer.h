@@ -113,14 +113,13 @@ class TransformBuffer : public tf2::BufferCore {
                    bool* is_new);
   std::string refuse(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
                      const std::string& fault, bool is_static);
-  void accept(const std::string& child);
   template <typename Change>
   void change_statements(const Change& change, Record* record);
   Record* find_or_make(const std::string& child);
   void forget_moving();
   bool way_up(const std::string& end, const std::string& frame,
               std::vector<std::string>* way) const;
-  std::vector<std::string> between(const std::string& fixed, const std::string& frame) const;
+  std::vector<const Record*> between(const std::string& fixed, const std::string& frame) const;
 
   mutable std::mutex mutex_;                         // guards the members below
   std::unordered_map<std::string, Record> records_;  ///< by child frame, without a slash

@@ -42,8 +42,9 @@ std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
     if (stamp) *stamp = ros::Time();
     return "";
   }
-  const std::string dispute = buffer.dispute(fixed, frame);
-  if (!dispute.empty()) return dispute;
+  std::string problem;
+  // An exception for each frame that tf does not know would cost more than this question.
+  if (!is_known(buffer, fixed, frame, time, &problem)) return problem;
   geometry_msgs::TransformStamped transform;
   try {
     transform = buffer.lookupTransform(fixed, frame, time);
@@ -65,21 +66,15 @@ std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
 
 std::string look_up_newest(const TransformBuffer& buffer, const std::string& fixed,
                            const std::string& frame, const ros::Time& now, double max_age,
-                           Eigen::Isometry3d* X_FT, ros::Time* newest) {
-  std::string problem;
-  // An exception in every cycle would cost more than this question.
-  if (!is_known(buffer, fixed, frame, ros::Time(), &problem)) {
-    return with_cause(buffer, fixed, frame, problem);
-  }
+                           Eigen::Isometry3d* X_FT, ros::Time* newest, bool* explained) {
   ros::Time stamp;
   Eigen::Isometry3d X;
-  problem = look_up(buffer, fixed, frame, ros::Time(), &X, &stamp);
-  if (!problem.empty()) return problem;
-  const double age =
-      stamp.isZero() ? 0.0 : seconds_between(buffer.counts_from(fixed, frame, stamp), now);
-  if (age > max_age) {
-    return with_cause(buffer, fixed, frame, too_old(fixed, frame, age, max_age));
+  std::string problem = look_up(buffer, fixed, frame, ros::Time(), &X, &stamp);
+  if (problem.empty() && !stamp.isZero()) {
+    const double age = seconds_between(buffer.counts_from(fixed, frame, stamp), now);
+    if (age > max_age) problem = too_old(fixed, frame, age, max_age);
   }
+  if (!problem.empty()) return with_cause(buffer, fixed, frame, problem, explained);
   *X_FT = X;
   if (newest) *newest = stamp;
   return "";

@@ -27,7 +27,7 @@ std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
                     const std::string& frame, const ros::Time& time, Eigen::Isometry3d* X_FT,
                     ros::Time* stamp = nullptr);
 
-/// Whether look_up() would succeed. It costs less than a look_up() that fails.
+/// Whether tf has the pose.
 /// @param problem  set where the answer is false; may be null
 bool is_known(const TransformBuffer& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem);
@@ -56,9 +56,11 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
 
 /// Looks up the newest pose, which must not be more than `max_age` [s] older than `now`. The age of
 /// transforms that were stamped ahead of the clock counts from their receipt.
+/// @param explained  as in with_cause()
 std::string look_up_newest(const TransformBuffer& buffer, const std::string& fixed,
                            const std::string& frame, const ros::Time& now, double max_age,
-                           Eigen::Isometry3d* X_FT, ros::Time* stamp = nullptr);
+                           Eigen::Isometry3d* X_FT, ros::Time* stamp = nullptr,
+                           bool* explained = nullptr);
 
 /// Adds to a sentence on a pose that is not known why transforms are refused, where they are.
 /// @param explained  receives whether the sentence names the cause; may be null
