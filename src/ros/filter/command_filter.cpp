@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
+#include <type_traits>
 
 #include "internal/geometry/numbers.h"
 #include "ist_proximity/geometry/error.h"
@@ -44,16 +45,14 @@ FilterConfig read_config(const ros::NodeHandle& private_nh) {
   return config;
 }
 
-void set_stamp(const ros::Time& now, trajectory_msgs::JointTrajectory* message) {
-  // A stamp of 0 means "now" to those who follow a trajectory.
-  if (!message->header.stamp.isZero()) message->header.stamp = now;
-}
 template <class Message>
 void set_stamp(const ros::Time& now, Message* message) {
-  message->header.stamp = now;
+  constexpr bool is_trajectory = std::is_same_v<Message, trajectory_msgs::JointTrajectory>;
+  if constexpr (ros::message_traits::HasHeader<Message>::value) {
+    // A stamp of 0 means "now" to those who follow a trajectory.
+    if (!is_trajectory || !message->header.stamp.isZero()) message->header.stamp = now;
+  }
 }
-void set_stamp(const ros::Time&, std_msgs::Float64MultiArray*) {}
-void set_stamp(const ros::Time&, geometry_msgs::Twist*) {}
 
 void publish_scale(double scale, const ros::Publisher& publisher) {
   std_msgs::Float64 message;
@@ -70,27 +69,21 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
   scale_ = private_nh_.advertise<std_msgs::Float64>("speed_scale", 10);
   markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("filter_markers", 1);
   read_robot();
+  const auto hints = ros::TransportHints().tcpNoDelay();
+  const auto take_into = [this](PlacedAnswers* placed) {
+    return boost::function<void(const ist_proximity::ProximityArray::ConstPtr&)>(
+        [this, placed](const ist_proximity::ProximityArray::ConstPtr& answers) {
+          take(answers, placed);
+        });
+  };
   if (config_.self_proximity) {
-    self_answers_ = nh_.subscribe("proximity/self_proximity", 1, &CommandFilter::take_self, this,
-                                  ros::TransportHints().tcpNoDelay());
+    self_answers_ = nh_.subscribe("proximity/self_proximity", 1, take_into(&self_), {}, hints);
   }
-  answers_ = nh_.subscribe("proximity/proximity", 1, &CommandFilter::take_answers, this,
-                           ros::TransportHints().tcpNoDelay());
-  joints_ = nh_.subscribe("joint_states", 50, &CommandFilter::take_joints, this,
-                          ros::TransportHints().tcpNoDelay());
-  node_scale_ = nh_.subscribe("proximity/speed_scale", 1, &CommandFilter::take_scale, this,
-                              ros::TransportHints().tcpNoDelay());
-  if (config_.command_type == "std_msgs/Float64MultiArray") {
-    subscribe<std_msgs::Float64MultiArray>();
-  } else if (config_.command_type == "sensor_msgs/JointState") {
-    subscribe<sensor_msgs::JointState>();
-  } else if (config_.command_type == "geometry_msgs/TwistStamped") {
-    subscribe<geometry_msgs::TwistStamped>();
-  } else if (config_.command_type == "geometry_msgs/Twist") {
-    subscribe<geometry_msgs::Twist>();
-  } else {
-    subscribe<trajectory_msgs::JointTrajectory>();
-  }
+  answers_ = nh_.subscribe("proximity/proximity", 1, take_into(&obstacles_), {}, hints);
+  joints_ = nh_.subscribe("joint_states", 50, &CommandFilter::take_joints, this, hints);
+  node_scale_ = nh_.subscribe("proximity/speed_scale", 1, &CommandFilter::take_scale, this, hints);
+  subscribe<trajectory_msgs::JointTrajectory, std_msgs::Float64MultiArray, sensor_msgs::JointState,
+            geometry_msgs::TwistStamped, geometry_msgs::Twist>();
   timer_ = nh_.createWallTimer(kZeroPeriod, [this](const ros::WallTimerEvent&) { on_timer(); });
 }
 
@@ -102,8 +95,14 @@ CommandFilter::~CommandFilter() {
   kLeave.sleep();
 }
 
-template <class Message>
+/// Subscribes to commands as the type of these that ~command_type names.
+template <class Message, class... Others>
 void CommandFilter::subscribe() {
+  if constexpr (sizeof...(Others) > 0) {
+    if (config_.command_type != ros::message_traits::datatype<Message>()) {
+      return subscribe<Others...>();
+    }
+  }
   safe_command_ = private_nh_.advertise<Message>("safe_command", 1);
   command_ = private_nh_.subscribe<Message>(
       "command", 1,
@@ -187,14 +186,6 @@ void CommandFilter::take_joints(const sensor_msgs::JointState& message) {
 void CommandFilter::take_scale(const std_msgs::Float64& scale) {
   newest_scale_ = scale.data >= 0.0 && scale.data <= 1.0 ? scale.data : 0.0;
   newest_scale_came_ = ros::Time::now();
-}
-
-void CommandFilter::take_answers(const ist_proximity::ProximityArray::ConstPtr& answers) {
-  take(answers, &obstacles_);
-}
-
-void CommandFilter::take_self(const ist_proximity::ProximityArray::ConstPtr& answers) {
-  take(answers, &self_);
 }
 
 void CommandFilter::take(const ist_proximity::ProximityArray::ConstPtr& answers,

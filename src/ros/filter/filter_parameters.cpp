@@ -1,5 +1,4 @@
-#include "ros/filter/filter_parameters.h"
-
+#include "ros/filter/command_filter.h"
 #include "ros/parameters/parameter_reader.h"
 
 namespace ist {

@@ -1,6 +1,7 @@
 #include "ros/trajectory/trajectory_watch.h"
 
 #include <actionlib_msgs/GoalID.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,11 +9,9 @@
 
 #include "internal/geometry/numbers.h"
 #include "internal/proximity/carried_worlds.h"
-#include "ros/common/publish.h"
 #include "ros/common/stopwatch.h"
 #include "ros/common/text.h"
 #include "ros/model/counted_links.h"
-#include "ros/trajectory/trajectory_markers.h"
 
 namespace ist {
 namespace {
@@ -20,17 +19,7 @@ namespace {
 // An answer is given as often as this, and with every new cloud.
 constexpr std::chrono::milliseconds kPeriod(100);
 constexpr double kWakeUp = 0.01;  // [s]
-// [s] A goal is cancelled so much before braking is due, for the thread and the message, and by the
-// time that an answer takes.
-constexpr double kAhead = 0.02;
-// Positions of joints that are older than this are not known.
-constexpr std::chrono::milliseconds kStateTimeout(500);
 constexpr std::size_t kMaxJoints = 10000;
-
-ros::Time after(const ros::Time& start, double seconds) {
-  const double time = start.toSec() + seconds;
-  return time > 0.0 ? ros::Time(time) : ros::Time();
-}
 
 // The trajectory says which links move, in whatever frame distances are.
 ServerConfig with_fixed_links(ServerConfig config) {
@@ -160,7 +149,7 @@ void TrajectoryWatch::run_when_due() {
   }
   message.header.frame_id = fixed_frame_of(*model_, config_);
   message.start = trajectory_.start;
-  message.end = after(trajectory_.start, trajectory_.end());
+  message.end = trajectory_.instant(trajectory_.end());
   if (now >= message.end) {
     is_watching_ = false;
     return publish(&message, Message::NONE, "the trajectory is over");
@@ -238,100 +227,6 @@ std::vector<bool> TrajectoryWatch::moved_links(const ros::Time& now) const {
     links[link] = counts[i] && body && (moves_object || is_moved(*body));
   }
   return links;
-}
-
-// @param now  [s] of the trajectory
-void TrajectoryWatch::fill(const std::vector<LinkClearance>& found, const std::vector<bool>& moved,
-                           double now, Message* message) {
-  double contact = kInfinity;
-  std::size_t first = 0;
-  std::string unknown;
-  message->lower_bound = kInfinity;
-  for (std::size_t i = 0; i < model_->monitored.size(); ++i) {
-    const std::size_t link = model_->monitored[i];
-    if (!moved[link]) continue;
-    const LinkClearance& one = found[link];
-    message->links.push_back(model_->links[i]);
-    message->lower_bounds.push_back(one.lower_bound);
-    if (std::isnan(one.contact_time)) {
-      if (unknown.empty()) unknown = model_->links[i];
-      continue;
-    }
-    message->lower_bound = std::min(message->lower_bound, one.lower_bound);
-    if (one.contact_time < contact) {
-      contact = one.contact_time;
-      first = i;
-    }
-  }
-  if (!unknown.empty()) {
-    message->lower_bound = kNaN;
-    message->state = Message::UNKNOWN;
-    message->text = "nothing is known of link '" + unknown + "' on its way" +
-                    (here_.status_text.empty() ? "" : ": " + here_.status_text);
-  } else if (contact == kInfinity) {
-    message->state = Message::CLEAR;
-    message->text = format_text("no link comes nearer than %.3f m", message->lower_bound);
-  } else {
-    fill_contact(first, contact, now, message);
-  }
-}
-
-// @param link  that touches first, as ~proximity counts
-void TrajectoryWatch::fill_contact(std::size_t link, double contact, double now, Message* message) {
-  message->state = Message::CONTACT;
-  message->contact = after(trajectory_.start, contact);
-  message->time_to_contact = (message->contact - message->header.stamp).toSec();
-  message->text = format_text("link '%s' may touch an obstacle in %.2f s",
-                              model_->links[link].c_str(), message->time_to_contact);
-  if (config_.deceleration.is_stated()) {
-    const double way =
-        braking_way(trajectory_.pieces, now, contact, config_.deceleration.of(*model_->kinematics));
-    message->brake = after(trajectory_.start, std::max(now, contact - way));
-    message->text +=
-        format_text("; braking is due in %.2f s", (message->brake - message->header.stamp).toSec());
-  }
-  LiveConfig live = live_();
-  live.query.deadline = 0.0;
-  ist_proximity::ProximityArray there;
-  const auto state = trajectory_.state(*model_->kinematics, contact);
-  if (!stated_.run(state, live, &there).empty() || link >= there.links.size()) return;
-  message->first = there.links[link];
-  draw(*message);
-}
-
-// Draws the robot where it was measured last.
-void TrajectoryWatch::draw(const Message& message) {
-  if (markers_.getNumSubscribers() == 0) return;
-  BodyPoses bodies;
-  stated_.poses().look_up_all(*model_->kinematics, message.contact, &bodies);
-  publish_message(markers_, trajectory_markers(message, *model_, bodies));
-}
-
-void TrajectoryWatch::publish(Message* message, std::uint8_t state, const std::string& text) {
-  message->state = state;
-  message->text = text;
-  const bool is_known = state == Message::CLEAR || state == Message::CONTACT;
-  if (!is_known) message->lower_bound = kNaN;
-  if (state != Message::CONTACT) {
-    message->time_to_contact = state == Message::CLEAR ? kInfinity : kNaN;
-  }
-  last_look_ = Clock::now();
-  is_unknown_ = state == Message::UNKNOWN;
-  // Without a deceleration a contact is told, and nobody knows when braking is due.
-  brake_ = state == Message::CONTACT ? message->brake : ros::Time();
-  publish_message(publisher_, *message);
-  cancel_when_due(message->header.stamp);
-}
-
-void TrajectoryWatch::cancel_when_due(const ros::Time& now) {
-  if (!cancel_ || !is_watching_) return;
-  const bool is_due = !brake_.isZero() && now + ros::Duration(kAhead + took_) >= brake_;
-  // The first joint states are still on their way.
-  const bool is_starting = Clock::now() - listening_since_ < kStateTimeout;
-  if (!is_due && (!is_unknown_ || is_starting)) return;
-  is_unknown_ = false;  // told again with the next answer
-  brake_ = ros::Time();
-  publish_message(cancel_, actionlib_msgs::GoalID());  // an empty one stands for all goals
 }
 
 }  // namespace ist

@@ -51,6 +51,8 @@ class TrajectoryWatch {
  private:
   using Clock = std::chrono::steady_clock;
   using Message = ist_proximity::TrajectoryClearance;
+  /// Positions of joints that are older than this are not known.
+  static constexpr std::chrono::milliseconds kStateTimeout{500};
   using Event = ros::MessageEvent<const trajectory_msgs::JointTrajectory>;
   struct Position {
     JointMotionNow motion;

@@ -4,6 +4,7 @@
 #include <sensor_msgs/JointState.h>
 #include <trajectory_msgs/JointTrajectory.h>
 
+#include <algorithm>
 #include <functional>
 #include <string>
 #include <vector>
@@ -26,6 +27,8 @@ struct WatchedTrajectory {
   StraightPieces pieces;
 
   double end() const { return pieces.times.back(); }  ///< [s]
+  /// When its time [s] is; 0 where that is before the clock's beginning.
+  ros::Time instant(double time) const { return ros::Time(std::max(0.0, start.toSec() + time)); }
   /// The positions of the joints that it moves, at a time [s].
   sensor_msgs::JointState state(const Kinematics& kinematics, double time) const;
 };
