@@ -212,30 +212,25 @@ TEST(UnseenMarkers, CubesNearTheRobot) {
       unseen_markers({box(1.1, 0.02), box(1.2, 0.02), box(1.25, 0.16), box(1.5, 0.02)}, robot, 0.3,
                      header)
           .markers;
-  ASSERT_EQ(drawn.size(), 3U);
-  EXPECT_EQ(drawn[0].action, Marker::DELETEALL);
-  ASSERT_EQ(drawn[1].points.size(), 2U);
-  EXPECT_NEAR(drawn[1].points[0].x, 1.11, 1e-9);
-  EXPECT_NEAR(drawn[1].scale.x, 0.25 * 0.02, 1e-9);
-  ASSERT_EQ(drawn[1].colors.size(), 2U);
-  EXPECT_GT(drawn[1].colors[0].a, drawn[1].colors[1].a);  // nearer
-  EXPECT_GT(drawn[1].colors[1].a, 0.0F);
-  ASSERT_EQ(drawn[2].points.size(), 2U);
-  EXPECT_NEAR(drawn[2].scale.x, 0.25 * 0.04, 1e-9);
-  EXPECT_NEAR(drawn[2].points[1].x, 1.31, 1e-9);
-  EXPECT_EQ(drawn[2].header.frame_id, "odom");
+  ASSERT_EQ(drawn.size(), 1U);
+  EXPECT_EQ(drawn[0].action, Marker::ADD);
+  EXPECT_EQ(drawn[0].header.frame_id, "odom");
+  ASSERT_EQ(drawn[0].points.size(), 4U);
+  EXPECT_NEAR(drawn[0].points[0].x, 1.11, 1e-9);
+  EXPECT_NEAR(drawn[0].points[3].x, 1.31, 1e-9);
+  ASSERT_EQ(drawn[0].colors.size(), 4U);
+  EXPECT_GT(drawn[0].colors[0].a, drawn[0].colors[1].a);  // nearer
+  EXPECT_GT(drawn[0].colors[1].a, 0.0F);
+  // What was drawn goes where nothing is unknown any more.
+  EXPECT_EQ(unseen_markers({}, robot, 0.3, header).markers[0].action, Marker::DELETE);
 
   // Too many: the nearest ones are drawn.
   VoxelBoxes many;
   for (int i = 0; i < 30000; ++i) many.push_back(box(1.28 - 1e-5 * i, 0.01));
   const auto nearest = unseen_markers(many, {robot[1]}, 0.3, header).markers;
-  std::size_t count = 0;
   double farthest = 0.0;
-  for (const Marker& list : nearest) {
-    count += list.points.size();
-    for (const auto& point : list.points) farthest = std::max(farthest, point.x);
-  }
-  EXPECT_EQ(count, 20000U);
+  for (const auto& point : nearest[0].points) farthest = std::max(farthest, point.x);
+  EXPECT_EQ(nearest[0].points.size(), 20000U);
   EXPECT_NEAR(farthest, 1.28 - 1e-5 * 10000 + 0.005, 1e-3);
 }
 

@@ -25,19 +25,11 @@ CameraModel camera_model(const sensor_msgs::CameraInfo& message) {
   return camera;
 }
 
-// Numbers that are NaN count as different, and are checked again with each message.
-bool is_same_camera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
-  return a.header.frame_id == b.header.frame_id && a.width == b.width && a.height == b.height &&
-         a.K == b.K && a.P == b.P && a.D == b.D && a.binning_x == b.binning_x &&
-         a.binning_y == b.binning_y && a.roi.x_offset == b.roi.x_offset &&
-         a.roi.y_offset == b.roi.y_offset && a.roi.width == b.roi.width &&
-         a.roi.height == b.roi.height;
-}
-
 }  // namespace
 
 void DepthCamera::take(const sensor_msgs::CameraInfo& message) {
-  if (has_come_ && is_same_camera(message, newest_)) return;
+  newest_.header = message.header;
+  if (has_come_ && newest_ == message) return;  // but numbers that are NaN are checked again
   newest_ = message;
   has_come_ = true;
   const CameraModel camera = camera_model(message);

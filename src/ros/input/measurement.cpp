@@ -1,12 +1,16 @@
 #include "ros/input/measurement.h"
 
+#include <sensor_msgs/point_cloud2_iterator.h>
+
 #include <algorithm>
 #include <boost/function.hpp>
 #include <boost/make_shared.hpp>
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
+#include <string_view>
 
 #include "internal/cloud/point_bvh.h"
 #include "ros/common/eigen_conversion.h"
@@ -29,20 +33,6 @@ constexpr double kAtOrigin = 1e-6;
 // little nearer than max_distance, and links out there say so.
 constexpr double kLargestPixelAngle = 0.0125;
 
-// FNV-1a by words of eight bytes; never 0.
-std::uint64_t hash_of(const void* data, std::size_t size) {
-  constexpr std::uint64_t kOffset = 14695981039346656037ULL, kPrime = 1099511628211ULL;
-  std::uint64_t hash = kOffset;
-  const auto* bytes = static_cast<const std::uint8_t*>(data);
-  for (std::size_t i = 0; i < size; i += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes + i, std::min(sizeof word, size - i));
-    hash = (hash ^ word) * kPrime;
-    hash ^= hash >> 32U;  // so that the highest bits of a word count for the lowest, too
-  }
-  return std::max<std::uint64_t>(hash, 1);
-}
-
 const std::vector<std::uint8_t>& numbers(const sensor_msgs::PointCloud2& message) {
   return message.data;
 }
@@ -54,7 +44,9 @@ template <typename Message>
 std::uint64_t content_of(const Message& message, const SourceConfig& config) {
   if (std::isinf(config.frozen_after)) return 0;
   const auto& all = numbers(message);
-  return hash_of(all.data(), all.size() * sizeof all[0]);
+  const std::string_view bytes(reinterpret_cast<const char*>(all.data()),
+                               all.size() * sizeof all[0]);
+  return std::max<std::uint64_t>(std::hash<std::string_view>()(bytes), 1);
 }
 std::uint64_t content_of(const topic_tools::ShapeShifter& /*map*/, const SourceConfig& /*config*/) {
   return 0;
@@ -167,25 +159,14 @@ Measurement read_cloud(const sensor_msgs::PointCloud2ConstPtr& message,
 
 sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros::Time& stamp,
                                        const std::string& fixed_frame) {
+  constexpr auto kFloat = sensor_msgs::PointField::FLOAT32;
   auto message = boost::make_shared<sensor_msgs::PointCloud2>();
   message->header.stamp = stamp;
   message->header.frame_id = fixed_frame;
-  const char* names[] = {"x", "y", "z"};
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    sensor_msgs::PointField field;
-    field.name = names[i];
-    field.offset = 4 * i;
-    field.datatype = sensor_msgs::PointField::FLOAT32;
-    field.count = 1;
-    message->fields.push_back(field);
-  }
-  message->height = 1;
-  message->width = static_cast<std::uint32_t>(snapshot.index.size());
-  message->point_step = 12;
-  message->row_step = message->point_step * message->width;
   message->is_dense = true;
-  message->data.resize(message->row_step);
-
+  sensor_msgs::PointCloud2Modifier modifier(*message);
+  modifier.setPointCloud2Fields(3, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat);
+  modifier.resize(snapshot.index.size());
   std::uint8_t* out = message->data.data();
   const Eigen::Isometry3d& X_FO = snapshot.index.X_FO();
   PointTile scratch;

@@ -44,7 +44,6 @@ SensorSource::SensorSource(const SourceConfig& config, ros::NodeHandle nh,
       filtered_(filtered),
       memory_(std::move(memory)),
       warm_up_(std::move(warm_up)),
-      placer_(config_, buffer),
       ingest_(ingest_config(config)),
       zone_ingest_(ingest_config(config)) {
   nh.setCallbackQueue(&queue_);
@@ -78,7 +77,8 @@ void SensorSource::run() {
     guard([&] { queue_.callAvailable(waiting_.empty() ? idle : kPollTf); });
     guard([this] {
       take_target();
-      drop_overdue();
+      const std::size_t dropped = waiting_.drop_overdue(ros::Time::now(), config_.timeout);
+      if (dropped > 0) update([&](SourceReport* report) { report->unusable += dropped; });
       place_newest();
       use_map();
       if (memory_) memory_->grow_older();
@@ -110,7 +110,7 @@ void SensorSource::take_target() {
   if (!is_same_time || !newest.is_same_robot(target_)) {
     in_use_ = ros::Time();
     map_is_new_ = last_map_ != nullptr;
-    placer_.begin_target();
+    target_since_ = std::chrono::steady_clock::now();
   }
   target_ = std::move(newest);
   if (memory_ && target_.model) memory_->begin_target(target_);
@@ -217,12 +217,6 @@ void SensorSource::start_again(const ros::Time& stamp) {
   });
 }
 
-/// Drops measurements that have waited so long that they are stale.
-void SensorSource::drop_overdue() {
-  const std::size_t dropped = waiting_.drop_overdue(ros::Time::now(), config_.timeout);
-  if (dropped > 0) update([&](SourceReport* report) { report->unusable += dropped; });
-}
-
 /// Uses the newest measurement whose poses are known. The wait for tf becomes a problem only when
 /// the newest measurement has waited unusually long.
 void SensorSource::place_newest() {
@@ -231,12 +225,11 @@ void SensorSource::place_newest() {
     waits_since_ = now;
     return;
   }
-  std::string wait;  // why the newest waits
-  const std::size_t i = waiting_.newest_ready([&](const Measurement& measurement) {
-    const std::string problem = placer_.missing_transform(measurement, target_);
-    if (&measurement == &waiting_.newest()) wait = problem;
-    return problem.empty();
-  });
+  const std::string wait = missing_transform(waiting_.newest());
+  const std::size_t i = wait.empty() ? waiting_.size() - 1
+                                     : waiting_.newest_ready([&](const Measurement& measurement) {
+                                         return missing_transform(measurement).empty();
+                                       });
   const std::chrono::duration<double> waits = now - waits_since_;
   if (!wait.empty() && waits.count() >= 0.5 * std::min(config_.timeout, 1.0)) {
     set_problem(wait + clock_difference(waiting_.newest()), false);
@@ -264,7 +257,7 @@ void SensorSource::use_map() {
 /// @returns empty on success, else a sentence
 std::string SensorSource::use(const Measurement& measurement) {
   Placement placement;
-  const std::string problem = placer_.place(measurement, target_, &placement);
+  const std::string problem = find_poses(measurement, &placement);
   if (!problem.empty()) return problem;
   SourceSnapshot& snapshot = exchange_.writable();
   const bool is_shown = !is_map_ && filtered_.getNumSubscribers() > 0;

@@ -10,7 +10,6 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ros/input/measurement.h"
 #include "ros/input/measurement_queue.h"
-#include "ros/input/placer.h"
 #include "ros/input/source.h"
 #include "ros/input/source_memory.h"
 #include "ros/input/zone_store.h"
@@ -23,7 +22,7 @@ namespace ist {
 /// A cloud waits until tf knows the poses of its sensor and, for the self-filter, of the links at
 /// the cloud's own stamp; a scan waits until the time of its last beam. The newest measurement that
 /// is ready is used, and older ones are dropped. What waits is bounded by the timeout and by memory
-/// (see MeasurementQueue). Links whose transforms have stopped are not waited for (see Placer).
+/// (see MeasurementQueue). Links whose transforms have stopped are not waited for.
 ///
 /// Messages are used in the order of their stamps. Where stamps go back (the sensor's driver or the
 /// map server has started again, with another clock), that is a new start, and is told.
@@ -58,7 +57,6 @@ class SensorSource : public Source {
   std::string check(const Measurement& measurement) const;
   double went_back(const ros::Time& stamp) const;
   void start_again(const ros::Time& stamp);
-  void drop_overdue();
   void place_newest();
   void use_map();
   std::string use(const Measurement& measurement);
@@ -67,6 +65,11 @@ class SensorSource : public Source {
   void take_in_zones(const Measurement& measurement, const Placement& placement,
                      const PlacedZones& zones, SourceSnapshot* snapshot);
   void publish(const SourceSnapshot& snapshot, bool is_shown);
+  std::string missing_transform(const Measurement& measurement) const;
+  bool is_worth_waiting_for(const std::string& link, const ros::Time& stamp) const;
+  std::string find_poses(const Measurement& measurement, Placement* placement) const;
+  void pose_robot(const ros::Time& stamp, std::size_t instant, std::vector<std::size_t>* last,
+                  Placement* placement) const;
   void note_view(const Placement& placement, const ViewReport& view);
 
   const bool is_map_;
@@ -77,15 +80,15 @@ class SensorSource : public Source {
   const WarmUp warm_up_;
 
   // Used by the source's thread alone.
-  Placer placer_;
   Ingest ingest_, zone_ingest_;  ///< the latter of what is in zones
   MeasurementQueue waiting_;
   std::shared_ptr<const Measurement> last_map_;
   bool map_is_new_ = false;    ///< last_map_ is not in use with this model yet
   ros::Time in_use_;           ///< stamp of the newest snapshot of this generation
   std::uint64_t content_ = 0;  ///< Measurement::content of the newest message
-  std::chrono::steady_clock::time_point waits_since_;  ///< nothing waited, or one was ingested
-  bool waits_for_tf_ = false;                          ///< the reported problem is that wait
+  std::chrono::steady_clock::time_point target_since_;  ///< with this model and generation
+  std::chrono::steady_clock::time_point waits_since_;   ///< nothing waited, or one was ingested
+  bool waits_for_tf_ = false;                           ///< the reported problem is that wait
 };
 
 }  // namespace ist

@@ -44,8 +44,8 @@ std::string ended_zone(const SourceSnapshot& snapshot, const ros::Time& now) {
 }
 
 SourceSnapshot& SnapshotExchange::writable() {
-  SnapshotPtr& back = channel_.back();
-  SnapshotPtr* const waiting = channel_.waiting();
+  SnapshotPtr& back = this->back();
+  SnapshotPtr* const waiting = this->waiting();
   if (waiting != nullptr && !is_unused(back) && is_unused(*waiting)) back.swap(*waiting);
   spare_age_ = waiting != nullptr ? spare_age_ + 1 : 0;
   if (!is_unused(back)) back = std::make_shared<SourceSnapshot>();
@@ -53,32 +53,14 @@ SourceSnapshot& SnapshotExchange::writable() {
 }
 
 bool SnapshotExchange::release_unused() {
-  SnapshotPtr* const waiting = channel_.waiting();
+  SnapshotPtr* const waiting = this->waiting();
   if (waiting == nullptr) return false;
-  SnapshotPtr& back = channel_.back();
+  SnapshotPtr& back = this->back();
   if (is_unused(back) && is_unused(*waiting) && spare_age_ >= kSpareAge) waiting->reset();
   for (SnapshotPtr* slot : {&back, waiting}) {
     if (is_unused(*slot)) empty(slot->get());
   }
   return true;
-}
-
-void SnapshotExchange::publish() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    shared_ = channel_.back();
-  }
-  channel_.publish();
-}
-
-const std::shared_ptr<SourceSnapshot>& SnapshotExchange::newest() {
-  channel_.update();
-  return channel_.front();
-}
-
-std::shared_ptr<const SourceSnapshot> SnapshotExchange::share() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return shared_;
 }
 
 }  // namespace ist

@@ -51,8 +51,39 @@ void add_clouds(const SourceSnapshot& snapshot, std::vector<const CloudSnapshot*
 /// Says which zone has left points out of a snapshot and does not hold any more; empty: all do.
 std::string ended_zone(const SourceSnapshot& snapshot, const ros::Time& now);
 
+/// Hands values from one thread to the cycle's, which never waits, and to any others.
+template <typename T>
+class SharedChannel : public SnapshotChannel<std::shared_ptr<T>> {
+ public:
+  /// Makes back() the newest value. The writing thread only.
+  void publish() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      shared_ = this->back();
+    }
+    SnapshotChannel<std::shared_ptr<T>>::publish();
+  }
+
+  /// The newest value; null before the first. It stays valid until the next call and never waits.
+  /// The cycle's thread only.
+  const std::shared_ptr<T>& newest() {
+    this->update();
+    return this->front();
+  }
+
+  /// The same for any other thread; valid as long as it is held.
+  std::shared_ptr<const T> share() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return shared_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const T> shared_;  ///< guarded by mutex_
+};
+
 /// Hands the snapshots of one source from its thread to the threads that query.
-class SnapshotExchange {
+class SnapshotExchange : public SharedChannel<SourceSnapshot> {
  public:
   /// The snapshot to fill next. It is an old one, whose memory is used again, unless readers hold
   /// all of these: two snapshots do while the cycle takes each one before the next is filled. The
@@ -68,21 +99,8 @@ class SnapshotExchange {
   /// needs it once. Ten seconds at 30 Hz.
   static constexpr int kSpareAge = 300;
 
-  /// Makes writable() the newest snapshot. The source's thread only.
-  void publish();
-
-  /// The newest snapshot; null before the first. It stays valid until the next call and never
-  /// waits. The cycle's thread only.
-  const std::shared_ptr<SourceSnapshot>& newest();
-
-  /// The newest snapshot; null before the first. It stays valid as long as it is held. Thread safe.
-  std::shared_ptr<const SourceSnapshot> share() const;
-
  private:
-  SnapshotChannel<std::shared_ptr<SourceSnapshot>> channel_;
   int spare_age_ = 0;  ///< snapshots since a third one was needed; the source's thread only
-  mutable std::mutex mutex_;
-  std::shared_ptr<const SourceSnapshot> shared_;  ///< guarded by mutex_
 };
 
 }  // namespace ist

@@ -35,6 +35,9 @@ std::string list(const std::vector<std::string>& names) {
   return text;
 }
 
+/// A sentence for somebody whose topic stays silent: that it has another type, or else which topics
+/// a source could have.
+/// @param own     a topic of the node itself, which is left out
 /// @param topics  all that are published
 std::string advice_on_topic(const std::string& topic, const std::string& type,
                             const std::string& own, const ros::master::V_TopicInfo& topics) {
@@ -84,19 +87,8 @@ SourceReport report_of(const SourceConfig& config, const std::string& place) {
   return report;
 }
 
-}  // namespace
-
-TopicAdvice::TopicAdvice(std::string topic, std::string type, std::string own)
-    : topic_(std::move(topic)),
-      type_(std::move(type)),
-      own_(std::move(own)),
-      next_(std::chrono::steady_clock::now() + kFirst) {}
-
-std::optional<std::string> TopicAdvice::ask() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now < next_) return std::nullopt;
-  next_ = now + kBetween;
-  // Unlike ros::master::getTopics(), this does not wait for a master that is gone.
+/// Asks the master, unlike ros::master::getTopics() not waiting for one that is gone.
+std::optional<ros::master::V_TopicInfo> published_topics() {
   XmlRpc::XmlRpcValue request, response, published;
   request[0] = ros::this_node::getName();
   request[1] = "";
@@ -107,15 +99,18 @@ std::optional<std::string> TopicAdvice::ask() {
   for (int i = 0; i < published.size(); ++i) {
     topics.emplace_back(std::string(published[i][0]), std::string(published[i][1]));
   }
-  return advice_on_topic(topic_, type_, own_, topics);
+  return topics;
 }
+
+}  // namespace
 
 Source::Source(const SourceConfig& config, const ros::NodeHandle& nh, const TransformBuffer& buffer,
                const std::string& own)
     : config_(config),
       buffer_(buffer),
       is_placed_when_asked_(config.type == SourceType::kMap || config.type == SourceType::kWorld),
-      topic_advice_(nh.resolveName(config.topic), message_type(config.type), own),
+      own_topic_(own),
+      next_advice_(Clock::now() + kFirst),
       report_(report_of(config, place_of(config, nh))) {}
 
 void Source::start() {
@@ -152,11 +147,7 @@ const SourceSnapshot* Source::newest(const SnapshotRequest& request) {
     original_ = snapshot;
     placed_ = *snapshot;
   }
-  std::string ended = ended_zone(*snapshot, ros::Time::now());
-  std::string problem = !ended.empty() ? std::move(ended)
-                        : is_placed_when_asked_
-                            ? place(request, &placed_)
-                            : buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame);
+  std::string problem = place(request, *snapshot, &placed_);
   std::string doubt = doubt_of_place(*snapshot);
   const std::lock_guard<std::mutex> lock(mutex_);
   placing_problem_ = std::move(problem);
@@ -168,18 +159,22 @@ const SourceSnapshot* Source::newest(const SnapshotRequest& request) {
 std::shared_ptr<const SourceSnapshot> Source::share(const SnapshotRequest& request) {
   std::shared_ptr<const SourceSnapshot> snapshot = exchange_.share();
   if (!is_current(snapshot.get(), request.model)) return nullptr;
-  if (!ended_zone(*snapshot, ros::Time::now()).empty()) return nullptr;
-  if (!is_placed_when_asked_) {
-    const bool is_disputed = !buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame).empty();
-    return is_disputed ? nullptr : snapshot;
-  }
-  const auto placed = std::make_shared<SourceSnapshot>(*snapshot);
-  return place(request, placed.get()).empty() ? placed : nullptr;
+  std::shared_ptr<SourceSnapshot> placed;
+  if (is_placed_when_asked_) placed = std::make_shared<SourceSnapshot>(*snapshot);
+  if (!place(request, *snapshot, placed.get()).empty()) return nullptr;
+  return placed ? placed : snapshot;
 }
 
 /// Looks up where the frames of objects and of a map are at an instant, or else at the newest one
-/// that tf knows.
-std::string Source::place(const SnapshotRequest& request, SourceSnapshot* snapshot) const {
+/// that tf knows. A cloud is placed already, and only asked whether that still holds.
+/// @param placed  receives it where the source is placed when asked
+/// @returns empty, or why the snapshot cannot be used
+std::string Source::place(const SnapshotRequest& request, const SourceSnapshot& original,
+                          SourceSnapshot* placed) const {
+  std::string ended = ended_zone(original, ros::Time::now());
+  if (!ended.empty()) return ended;
+  if (!is_placed_when_asked_) return buffer_.dispute(original.fixed_frame, original.map_frame);
+  SourceSnapshot* const snapshot = placed;
   std::vector<Eigen::Isometry3d>& X_FB = snapshot->world.X_FB;
   snapshot->lags.resize(X_FB.size() + (snapshot->cloud.boxes ? 1 : 0));
   const auto place_frame = [&](const std::string& frame, Lag* lag, Eigen::Isometry3d* X) {
@@ -255,7 +250,12 @@ std::optional<std::uint32_t> Source::count_publishers() {
   next_count_ = now + std::chrono::milliseconds(500);
   const std::uint32_t publishers = subscribers_.front().getNumPublishers();
   std::optional<std::string> advice;
-  if (!has_received_) advice = topic_advice_.ask();
+  if (!has_received_ && now >= next_advice_) {
+    next_advice_ = now + kBetween;
+    if (const auto topics = published_topics()) {
+      advice = advice_on_topic(report_.topic, report_.type, own_topic_, *topics);
+    }
+  }
   update([&](SourceReport* report) {
     report->publishers = publishers;
     report->has_been_there |= publishers > 0;

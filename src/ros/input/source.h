@@ -74,24 +74,6 @@ struct SourceTarget {
   }
 };
 
-/// A sentence for somebody whose topic stays silent: that it has another type, or else which topics
-/// a source could have. The master is asked now and then; it may take long to answer, so no lock
-/// should be held around ask(). Not thread safe.
-class TopicAdvice {
- public:
-  /// @param topic  resolved
-  /// @param type   message type that the source expects
-  /// @param own    topic of the node itself, which is left out
-  TopicAdvice(std::string topic, std::string type, std::string own);
-
-  /// Returns the sentence when it is due and the master answers, else nothing.
-  std::optional<std::string> ask();
-
- private:
-  const std::string topic_, type_, own_;
-  std::chrono::steady_clock::time_point next_;
-};
-
 /// The common part of sensors, maps and known worlds: a topic whose messages are turned into
 /// snapshots by a thread of its own, so that neither a large message nor a late transform ever
 /// delays a query, and the report about it. The lock is held for copies only.
@@ -153,7 +135,8 @@ class Source : public ObstacleSource {
   bool has_received_ = false;
 
  private:
-  std::string place(const SnapshotRequest& request, SourceSnapshot* snapshot) const;
+  std::string place(const SnapshotRequest& request, const SourceSnapshot& original,
+                    SourceSnapshot* placed) const;
   std::string doubt_of_place(const SourceSnapshot& snapshot) const;
   bool is_current(const SourceSnapshot* snapshot, const std::shared_ptr<const RobotModel>& model);
   void notice_clock_jump();
@@ -167,8 +150,8 @@ class Source : public ObstacleSource {
   using Clock = std::chrono::steady_clock;
 
   // Used by the source's thread alone.
-  Clock::time_point next_count_;
-  TopicAdvice topic_advice_;
+  const std::string own_topic_;
+  Clock::time_point next_count_, next_advice_;
 
   std::mutex mutex_;  ///< guards the members below
   SourceTarget newest_target_;

@@ -1,10 +1,10 @@
 #include "ros/input/source_memory.h"
 
 #include <ros/console.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <utility>
 #include <vector>
 
@@ -38,8 +38,8 @@ double extent_of_voxels(const PointExtent& extent, double max_range) {
 }
 
 bool is_there(const std::string& path) {
-  struct stat ignored {};
-  return ::stat(path.c_str(), &ignored) == 0;
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
 }
 
 }  // namespace
@@ -162,8 +162,8 @@ void SourceMemory::note_loss(const std::string& text) {
 }
 
 std::string SourceMemory::loss() const {
-  const std::lock_guard<std::mutex> lock(told_mutex_);
-  return ros::Time::now().toSec() < told_.lost_until ? told_.loss : "";
+  const std::shared_ptr<const Told> told = told_.share();
+  return told && ros::Time::now().toSec() < told->lost_until ? told->loss : "";
 }
 
 /// Hands what is told, and newest(), to those who must not wait for a cloud.
@@ -172,40 +172,36 @@ void SourceMemory::hand_over() {
   told_next_.doubt = file_problem_.empty() ? shortage() : file_problem_;
   if (!config_.required && !std::isnan(map_.now())) {
     told_next_.all = make_snapshot(&MemoryMap::occupied_boxes);
-    channel_.back() = told_next_.all;
-    channel_.publish();
   }
-  const std::lock_guard<std::mutex> lock(told_mutex_);
-  told_ = told_next_;
+  told_.back() = std::make_shared<const Told>(told_next_);
+  told_.publish();
 }
 
 const SourceSnapshot* SourceMemory::newest(const SnapshotRequest& /*request*/) {
-  channel_.update();
-  return channel_.front().get();
+  const std::shared_ptr<const Told>& told = told_.newest();
+  return told ? told->all.get() : nullptr;
 }
 
 std::shared_ptr<const SourceSnapshot> SourceMemory::share(const SnapshotRequest& /*request*/) {
-  const std::lock_guard<std::mutex> lock(told_mutex_);
-  return told_.all;
+  const std::shared_ptr<const Told> told = told_.share();
+  return told ? told->all : nullptr;
 }
 
 /// @returns empty on success, else why the cloud is not remembered
 std::string SourceMemory::insert(const Measurement& measurement, const Placement& placement,
                                  const SourceTarget& target, const SourceSnapshot& cloud) {
+  const std::string fault = "the last " + std::string(noun(config_.type)) + " is not remembered: ";
   for (std::size_t i = 0; i < placement.known.size(); ++i) {
     const LinkModel& link = target.model->links[i];
     if (is_pending(link)) {
-      return "the last " + std::string(noun(config_.type)) + " is not remembered: link '" +
-             link.name + "' is not ready yet, and the robot itself would be";
+      return fault + "link '" + link.name + "' is not ready yet, and the robot itself would be";
     }
     if (placement.known[i] || !link.usable() || link.tree.empty()) continue;
-    return "the last " + std::string(noun(config_.type)) +
-           " is not remembered: the pose of link '" + link.name +
+    return fault + "the pose of link '" + link.name +
            "' was not known, and the robot itself would be";
   }
   if (!cloud.cloud.counts.saw_enough(kMinMeasured)) {
-    return "the last " + std::string(noun(config_.type)) +
-           " is not remembered: too little of it was measured";
+    return fault + "too little of it was measured";
   }
   map_.set_region(target.region);
   read_memory_scan(measurement.points, cloud.cloud, cloud.cloud.X_FS, config_.ingest.min_range,
@@ -278,11 +274,12 @@ void SourceMemory::report(SourceReport* report) {
   report->is_memory = true;
   report->measures = false;
   report->required = false;
-  const std::lock_guard<std::mutex> lock(told_mutex_);
-  report->problem = told_.problem;
-  report->doubt = told_.doubt;
-  report->memory_voxels = told_.counts.nodes;
-  report->memory_occupied = told_.counts.occupied;
+  const std::shared_ptr<const Told> told = told_.share();
+  if (!told) return;
+  report->problem = told->problem;
+  report->doubt = told->doubt;
+  report->memory_voxels = told->counts.nodes;
+  report->memory_occupied = told->counts.occupied;
 }
 
 std::string SourceMemory::save(bool* is_saved) {

@@ -115,7 +115,6 @@ class SourceMemory : public ObstacleSource {
   ros::Time cloud_stamp_, counts_from_;  ///< of the last cloud
   double extent_ = 0.0;                  ///< [m] of its points in voxels
   std::chrono::steady_clock::time_point next_publication_, next_count_, next_growth_;
-  SnapshotChannel<std::shared_ptr<const SourceSnapshot>> channel_;  ///< of newest()
 
   mutable std::mutex mutex_;  ///< guards the members below
   MemoryMap map_, body_;
@@ -126,8 +125,7 @@ class SourceMemory : public ObstacleSource {
   Told told_next_;
   double took_ = 0.0;  ///< [s] of the last cloud
 
-  mutable std::mutex told_mutex_;  ///< guards the next one, for copies only
-  Told told_;
+  SharedChannel<const Told> told_;
 };
 
 /// The memories of all sources that have one.

@@ -3,11 +3,8 @@
 #include <ros/console.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cmath>
 #include <limits>
-#include <map>
 
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/exceptions.h"
@@ -37,8 +34,7 @@ using visualization_msgs::Marker;
 
 constexpr std::size_t kMaxCubes = 20000;
 constexpr double kLargestCube = 0.05;  // [m] Larger boxes are drawn in parts.
-constexpr double kDrawnShare = 0.25;   // of a cube's edges, so that the robot is seen through them
-constexpr double kSizeStep = 1e-4;     // [m] Cubes whose sizes differ by less are one list.
+constexpr double kDrawn = 0.01;  // [m] of a cube's edges, so that the robot is seen through them
 constexpr double kGrey = 0.6;
 constexpr double kOpacity = 0.8;  // of what touches a link; nothing is left at the range's end
 
@@ -78,25 +74,6 @@ void append_parts(const Eigen::AlignedBox3d& box, const VoxelBoxes& links, doubl
   append_parts(high, links, range, cubes);
 }
 
-void keep_nearest(std::vector<Cube>* cubes) {
-  if (cubes->size() <= kMaxCubes) return;
-  std::nth_element(cubes->begin(), cubes->begin() + kMaxCubes, cubes->end(),
-                   [](const Cube& a, const Cube& b) { return a.distance < b.distance; });
-  cubes->resize(kMaxCubes);
-}
-
-Marker cube_list(const Eigen::Vector3d& size, const std_msgs::Header& header, int id) {
-  Marker marker;
-  marker.header = header;
-  marker.ns = "unseen";
-  marker.id = id;
-  marker.type = Marker::CUBE_LIST;
-  marker.pose.orientation.w = 1.0;
-  assign(kDrawnShare * size, &marker.scale);
-  marker.color = grey(kOpacity);
-  return marker;
-}
-
 }  // namespace
 
 UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, double range,
@@ -111,40 +88,30 @@ UnknownSpaceWatch::~UnknownSpaceWatch() {
   thread_.join();
 }
 
-const UnknownSnapshot* UnknownSpaceWatch::newest() {
-  channel_.update();
-  return channel_.front().get();
-}
-
-std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::share() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return shared_;
-}
-
 visualization_msgs::MarkerArray unseen_markers(const VoxelBoxes& boxes, const VoxelBoxes& links,
                                                double range, const std_msgs::Header& header) {
-  visualization_msgs::MarkerArray array;
-  array.markers.emplace_back();
-  array.markers.back().header = header;
-  array.markers.back().action = Marker::DELETEALL;
-  array.markers.back().pose.orientation.w = 1.0;
   std::vector<Cube> cubes;
   for (const Eigen::AlignedBox3d& box : boxes) append_parts(box, links, range, &cubes);
-  keep_nearest(&cubes);
-
-  std::map<std::array<long, 3>, std::size_t> lists;  // by size, all cubes of which are one marker
+  if (cubes.size() > kMaxCubes) {
+    std::nth_element(cubes.begin(), cubes.begin() + kMaxCubes, cubes.end(),
+                     [](const Cube& a, const Cube& b) { return a.distance < b.distance; });
+    cubes.resize(kMaxCubes);
+  }
+  Marker marker;
+  marker.header = header;
+  marker.ns = "unseen";
+  marker.type = Marker::CUBE_LIST;
+  marker.action = cubes.empty() ? Marker::DELETE : Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  marker.scale.x = marker.scale.y = marker.scale.z = kDrawn;
+  marker.color = grey(kOpacity);
   for (const Cube& cube : cubes) {
-    const Eigen::Vector3d size = cube.box.sizes();
-    std::array<long, 3> key{};
-    for (int k = 0; k < 3; ++k) key[static_cast<std::size_t>(k)] = std::lround(size[k] / kSizeStep);
-    const auto [list, is_new] = lists.try_emplace(key, array.markers.size());
-    if (is_new) array.markers.push_back(cube_list(size, header, static_cast<int>(lists.size())));
-    Marker& marker = array.markers[list->second];
     marker.points.emplace_back();
     assign(cube.box.center(), &marker.points.back());
-    const double opacity = kOpacity * (1.0 - cube.distance / range);
-    marker.colors.push_back(grey(opacity));
+    marker.colors.push_back(grey(kOpacity * (1.0 - cube.distance / range)));
   }
+  visualization_msgs::MarkerArray array;
+  array.markers.push_back(std::move(marker));
   return array;
 }
 
@@ -172,10 +139,8 @@ void UnknownSpaceWatch::run() {
       ROS_ERROR_STREAM_THROTTLE(5.0, "unknown space could not be found: " << fault);
     }
     // Without a snapshot nothing counts as seen.
-    channel_.back() = snapshot;
+    channel_.back() = std::move(snapshot);
     channel_.publish();
-    const std::lock_guard<std::mutex> lock(mutex_);
-    shared_ = snapshot;
     wait = std::max(kShortestPeriod, watch.lap() / kWorkingShare);
   }
 }

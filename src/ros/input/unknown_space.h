@@ -8,7 +8,6 @@
 #include <Eigen/Geometry>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -47,9 +46,9 @@ class UnknownSpaceWatch {
 
   /// The newest snapshot; null: nothing has been seen yet. It stays valid until the next call and
   /// never waits. The cycle's thread only.
-  const UnknownSnapshot* newest();
+  const UnknownSnapshot* newest() { return channel_.newest().get(); }
   /// The same for any other thread; valid as long as it is held.
-  std::shared_ptr<const UnknownSnapshot> share() const;
+  std::shared_ptr<const UnknownSnapshot> share() const { return channel_.share(); }
 
   /// [m] Space nearer to a link than this may be the robot's own, and counts as known.
   double skin() const { return skin_; }
@@ -64,16 +63,14 @@ class UnknownSpaceWatch {
   const ros::Publisher publisher_;
   std::chrono::steady_clock::time_point next_publication_;  ///< used by the thread alone
   double skin_ = 0.0;
-  SnapshotChannel<std::shared_ptr<const UnknownSnapshot>> channel_;
-  mutable std::mutex mutex_;
-  std::shared_ptr<const UnknownSnapshot> shared_;  ///< guarded by mutex_
+  SharedChannel<const UnknownSnapshot> channel_;
   StopSignal stop_;
   std::thread thread_;
 };
 
-/// Draws the unknown space near a robot as small grey cubes, the fainter the farther they are,
-/// after what was drawn before is deleted. Where there are more cubes than rviz can turn smoothly,
-/// the nearest are drawn.
+/// Draws the unknown space near a robot as small grey cubes, the fainter the farther they are, in
+/// place of those drawn before. Where there are more than rviz can turn smoothly, the nearest are
+/// drawn.
 /// @param boxes  [m] of unknown space
 /// @param links  [m] each holds a link, in the same frame
 /// @param range  [m] what is farther than this from each of `links` is not drawn

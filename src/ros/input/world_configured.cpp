@@ -76,32 +76,67 @@ void WorldSource::read_configured() {
                              << " objects");
 }
 
-/// Reads the other robot's description as soon as it is there.
+/// Makes the links of the other robot objects, whose frames move with it, as soon as its
+/// description is there. Their poses come from tf, or from its joint states by the node's own
+/// kinematics, which puts them into the buffer under names that no frame of tf has.
 void WorldSource::read_robot() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_reading_) return;
   next_reading_ = now + kRobotPeriod;
-  std::vector<WorldObject> links;
-  std::vector<WorldFault> faults;
-  const std::string problem = robot_->read(cancelled_, &links, &faults);
+  RobotDescription description;
+  const std::string problem = read_description(&description);
   if (!problem.empty()) {
     if (faults_[fault_of(Kind::kRobot)] != problem) note_fault(fault_of(Kind::kRobot), problem);
     return show_faults();
   }
   faults_.erase(fault_of(Kind::kRobot));
-  for (WorldObject& link : links) {
-    link.margin = config_.world.margin;
-    configured_.insert(link.name);
+  std::vector<WorldObject> links;
+  for (LinkDescription& link : description.links) {
+    WorldObject object;
+    object.name = config_.world.robot.tf_prefix + link.name;
+    object.frame = robot_prefix_ + link.name;
+    object.geometry = std::move(link.geometry);
+    object.margin = config_.world.margin;
+    configured_.insert(object.name);
+    if (link.error.empty()) {
+      links.push_back(std::move(object));
+    } else {
+      note_fault(object_fault(object.name), "the other robot's " + link.error);
+    }
   }
   add(Kind::kRobot, links);
-  for (const WorldFault& fault : faults) {
-    note_fault(object_fault(fault.object), fault.text);
-    configured_.insert(fault.object);
-  }
-  show_faults();
   is_robot_read_ = true;
   ROS_INFO_STREAM("source '" << config_.name << "': another robot of " << links.size()
                              << " links with geometry");
+}
+
+/// Reads the other robot's description from the parameter server, and places it in tf.
+/// @returns empty, or why it cannot be read yet
+std::string WorldSource::read_description(RobotDescription* description) {
+  const OtherRobotConfig& robot = config_.world.robot;
+  std::string key, urdf;
+  if (!nh_.searchParam(robot.description, key) || !nh_.getParam(key, urdf)) {
+    return "waiting for the parameter '" + robot.description + "' with the other robot's URDF";
+  }
+  std::shared_ptr<const Kinematics> kinematics;
+  try {
+    *description = parse_urdf(
+        urdf, GeometrySource::kCollision, environment_package_finder(),
+        [this](const std::string& /*link*/, const std::string& /*mesh*/) { return !cancelled_(); });
+    kinematics = std::make_shared<const Kinematics>(*description);
+  } catch (const ModelError& error) {
+    return "the other robot's URDF in '" + key + "' cannot be used: " + error.what();
+  }
+  if (!robot_joints_) return "";
+  const std::string base = without_slash(config_.world.frame_id);
+  const std::string& root = description->root_link;
+  geometry_msgs::TransformStamped placed;
+  placed.header.frame_id = base.empty() ? robot.tf_prefix + root : base;
+  placed.child_frame_id = robot_prefix_ + root;
+  placed.transform.rotation.w = 1.0;
+  const std::string fault = robot_buffer_.add(placed, robot_prefix_, true, ros::Time());
+  if (fault.empty()) robot_joints_->set_kinematics(kinematics);
+  return fault;
 }
 
 /// @param what  the key of a fault of all of them
@@ -120,9 +155,9 @@ void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objec
     complete.push_back(object);
     complete.back().frame = frame_or_fixed(object.frame);
     faults_.erase(object_fault(object.name));
-    const std::vector<std::string> links = configured_contacts(object.name);
-    std::vector<std::string>& allowed = complete.back().allowed_links;
-    allowed.insert(allowed.end(), links.begin(), links.end());
+    for (const auto& [link, name] : config_.world.allowed_contacts) {
+      if (name == object.name) complete.back().allowed_links.push_back(link);
+    }
   }
   const std::vector<WorldFault> faults = builder_.add(complete, cancelled_);
   for (const WorldFault& fault : faults) {
@@ -130,15 +165,6 @@ void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objec
   }
   is_changed_ = true;
   show_faults();
-}
-
-/// The links that ~allowed_contacts names for an object.
-std::vector<std::string> WorldSource::configured_contacts(const std::string& object) const {
-  std::vector<std::string> links;
-  for (const auto& [link, name] : config_.world.allowed_contacts) {
-    if (name == object) links.push_back(link);
-  }
-  return links;
 }
 
 /// @param stated  by a message; may be empty

@@ -23,10 +23,18 @@ constexpr std::uint32_t kWorldQueueSize = 1000;
 
 WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
                          TransformBuffer* buffer)
-    : Source(config, nh, *buffer, ""), builder_(config.world.limits) {
-  if (!config.world.robot.description.empty()) {
-    robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, config.name,
-                                          nh, buffer);
+    : Source(config, nh, *buffer, ""),
+      nh_(nh),
+      robot_buffer_(*buffer),
+      robot_prefix_(config.world.robot.joint_states.empty() ? config.world.robot.tf_prefix
+                                                            : "(robot of " + config.name + ") "),
+      builder_(config.world.limits) {
+  const OtherRobotConfig& robot = config.world.robot;
+  if (!robot.description.empty()) {
+    if (!robot.joint_states.empty()) {
+      robot_joints_ = std::make_unique<JointStateListener>(buffer, nh, robot.joint_states,
+                                                           robot_prefix_, [] {});
+    }
     is_robot_read_ = false;
     update([](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
   }
@@ -50,7 +58,10 @@ void WorldSource::run() {
       if (is_mirror_) note_silence();
       take_target();
       if (is_changed_ && target_.model) publish();
-      free_unused();
+      // So that no query has to free what nobody else has any more.
+      made_.erase(std::remove_if(made_.begin(), made_.end(),
+                                 [](const auto& world) { return world.use_count() == 1; }),
+                  made_.end());
       if (faults_.erase(fault_of(Kind::kWork)) > 0) show_faults();
     });
   }
@@ -124,17 +135,12 @@ void WorldSource::publish() {
   publish_markers();
 }
 
-/// Frees the worlds that nobody else has any more here, so that no query has to.
-void WorldSource::free_unused() {
-  made_.erase(std::remove_if(made_.begin(), made_.end(),
-                             [](const auto& world) { return world.use_count() == 1; }),
-              made_.end());
-}
-
 void WorldSource::publish_markers() {
   const auto frame_of = [this](const std::string& frame) {
     if (frame == kFixedFrame) return target_.fixed_frame;
-    return robot_ && robot_->owns(frame) ? std::string() : frame;
+    const bool is_ours =
+        robot_joints_ && frame.compare(0, robot_prefix_.size(), robot_prefix_) == 0;
+    return is_ours ? std::string() : frame;  // tf has no such name
   };
   publish_message(markers_, world_markers(*builder_.world(), frame_of));
 }

@@ -18,10 +18,11 @@
 #include "internal/geometry/limits.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/known_world.h"
-#include "ros/input/other_robot.h"
+#include "ist_proximity/robot/robot_description.h"
 #include "ros/input/source.h"
 #include "ros/input/world_faults.h"
 #include "ros/parameters/source_config.h"
+#include "ros/poses/joint_state_listener.h"
 
 namespace ist {
 
@@ -46,6 +47,7 @@ class WorldSource : public Source {
   void guard(WorldFaultKind what, const std::function<void()>& function);
   void read_configured();
   void read_robot();
+  std::string read_description(RobotDescription* description);
   void note_receipt(const ros::Time& stamp);
   void replace_from_topic(const std::function<void()>& change);
   void receive(const ist_proximity::WorldObjects& message);
@@ -61,14 +63,15 @@ class WorldSource : public Source {
   void add(WorldFaultKind what, const std::vector<WorldObject>& objects);
   void note_fault(const WorldFaultKey& key, const std::string& fault);
   void show_faults();
-  std::vector<std::string> configured_contacts(const std::string& object) const;
   void take_target();
   void publish();
-  void free_unused();
   void publish_markers();
 
+  const ros::NodeHandle nh_;
   ros::Publisher markers_;
-  std::unique_ptr<OtherRobot> robot_;  ///< null: none
+  TransformBuffer& robot_buffer_;
+  const std::string robot_prefix_;  ///< of the frames of the other robot's links in the buffer
+  std::unique_ptr<JointStateListener> robot_joints_;  ///< null: its poses come from tf, or none
 
   // Used by the source's thread alone.
   WorldBuilder builder_;

@@ -1,4 +1,7 @@
-#include "ros/input/placer.h"
+// This part of SensorSource finds the poses of sensor and robot at the instants of a measurement.
+// It takes the place of tf2_ros::MessageFilter, which can neither give up on a single frame
+// (setTargetFrames() needs clear(), which races with the tf listener's thread) nor name the
+// transform that it waits for.
 
 #include <algorithm>
 #include <vector>
@@ -6,12 +9,14 @@
 #include "ist_proximity/robot/link_poses.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
+#include "ros/input/sensor_source.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
 namespace {
 
 constexpr std::chrono::milliseconds kGrace(500);
+constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 
 // Poses of a link that are nearer to each other count once in the self-filter, whose padding is
 // much more: a scan of ten seconds has 400 instants, and the robot often stands still. [m]
@@ -27,29 +32,22 @@ bool stays_in_place(const InnerSphereTree& tree, const Eigen::Isometry3d& X_FL,
 
 }  // namespace
 
-// A cloud is worth more without one link's self-filter than after its timeout, so the wait ends
-// before that.
-Placer::Placer(const SourceConfig& config, const TransformBuffer& buffer)
-    : config_(config), patience_(0.8 * std::min(config.timeout, 1.0)), buffer_(buffer) {}
-
-void Placer::begin_target() { target_since_ = std::chrono::steady_clock::now(); }
-
-std::string Placer::missing_transform(const Measurement& measurement,
-                                      const SourceTarget& target) const {
+/// @returns empty when all poses are known that are worth waiting for, else a sentence
+std::string SensorSource::missing_transform(const Measurement& measurement) const {
   const std::string sensor = without_slash(measurement.header.frame_id);
   const std::vector<ros::Time>& instants = measurement.instants;
   std::string problem;
   for (const ros::Time& time : {instants.front(), instants.back()}) {
-    if (is_known(buffer_, target.fixed_frame, sensor, time, &problem)) continue;
-    return with_cause(buffer_, target.fixed_frame, sensor, problem);
+    if (is_known(buffer_, target_.fixed_frame, sensor, time, &problem)) continue;
+    return with_cause(buffer_, target_.fixed_frame, sensor, problem);
   }
   if (!config_.ingest.self_filter) return "";
   for (const ros::Time& time : {instants.front(), instants.back()}) {
-    for (std::size_t i = 0; i < target.model->links.size(); ++i) {
-      const LinkModel& link = target.model->links[i];
-      if (link.usable() && target.filters[i] &&
-          !is_known(buffer_, target.fixed_frame, link.name, time, &problem) &&
-          is_worth_waiting_for(link.name, target.fixed_frame, time)) {
+    for (std::size_t i = 0; i < target_.model->links.size(); ++i) {
+      const LinkModel& link = target_.model->links[i];
+      if (link.usable() && target_.filters[i] &&
+          !is_known(buffer_, target_.fixed_frame, link.name, time, &problem) &&
+          is_worth_waiting_for(link.name, time)) {
         return "the self-filter waits: " + problem;
       }
     }
@@ -58,40 +56,38 @@ std::string Placer::missing_transform(const Measurement& measurement,
 }
 
 /// The wait does not even begin for a link whose transforms have stopped. At the start all links
-/// get time to appear.
-bool Placer::is_worth_waiting_for(const std::string& link, const std::string& fixed_frame,
-                                  const ros::Time& stamp) const {
+/// get time to appear. A cloud is worth more without one link's self-filter than after its timeout,
+/// so the wait ends before that.
+bool SensorSource::is_worth_waiting_for(const std::string& link, const ros::Time& stamp) const {
   const ros::Time now = ros::Time::now();
-  if (seconds_between(stamp, now) > patience_) return false;
+  const double patience = 0.8 * std::min(config_.timeout, 1.0);
+  if (seconds_between(stamp, now) > patience) return false;
   if (std::chrono::steady_clock::now() - target_since_ < kGrace) return true;
   Eigen::Isometry3d ignored;
   ros::Time newest;
-  return look_up(buffer_, fixed_frame, link, ros::Time(), &ignored, &newest).empty() &&
-         seconds_between(newest, now) < patience_;
+  return look_up(buffer_, target_.fixed_frame, link, ros::Time(), &ignored, &newest).empty() &&
+         seconds_between(newest, now) < patience;
 }
 
 /// Adds the links whose poses are known at an instant, but for those that have not moved.
-void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, std::size_t instant,
-                        FilterPoses* last, Placement* placement) const {
-  const auto& links = target.model->links;
-  std::string ignored;
+/// @param last  by link: the number of its newest solid in Placement::robot; else kNowhere
+void SensorSource::pose_robot(const ros::Time& stamp, std::size_t instant,
+                              std::vector<std::size_t>* last, Placement* placement) const {
+  const auto& links = target_.model->links;
   for (std::size_t i = 0; i < links.size(); ++i) {
-    if (!target.filters[i]) continue;
-    // An exception per missing link and cloud would cost more than is_known().
+    if (!target_.filters[i]) continue;
     Eigen::Isometry3d X_FL;
     const bool known = links[i].usable() &&
-                       is_known(buffer_, target.fixed_frame, links[i].name, stamp, &ignored) &&
-                       look_up(buffer_, target.fixed_frame, links[i].name, stamp, &X_FL).empty();
+                       look_up(buffer_, target_.fixed_frame, links[i].name, stamp, &X_FL).empty();
     // A link whose pose is unknown at any instant is not filtered for certain.
     placement->known[i] = placement->known[i] && known;
     if (!known || links[i].tree.empty()) continue;
-    if (last->known[i] && stays_in_place(links[i].tree, last->X_FL[i], X_FL)) {
-      placement->robot_instants[last->solid[i]].second = instant;  // it is where it was already
+    std::size_t& solid = (*last)[i];
+    if (solid != kNowhere && stays_in_place(links[i].tree, placement->robot[solid].X_FL, X_FL)) {
+      placement->robot_instants[solid].second = instant;  // it is where it was already
       continue;
     }
-    last->known[i] = true;
-    last->X_FL[i] = X_FL;
-    last->solid[i] = placement->robot.size();
+    solid = placement->robot.size();
     placement->robot.push_back(posed_solid(links[i], X_FL));
     if (const auto& paddings = config_.link_paddings; !paddings.empty()) {
       const auto own = paddings.find(links[i].name);
@@ -101,26 +97,23 @@ void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, std:
   }
 }
 
-std::string Placer::place(const Measurement& measurement, const SourceTarget& target,
-                          Placement* placement) const {
+/// Looks up the poses.
+/// @returns empty on success, else a sentence
+std::string SensorSource::find_poses(const Measurement& measurement, Placement* placement) const {
   const std::string sensor = without_slash(measurement.header.frame_id);
   const std::vector<ros::Time>& instants = measurement.instants;
   if (instants.empty()) return "";
   std::string problem =
-      look_up(buffer_, target.fixed_frame, sensor, instants.front(), &placement->X_FS);
+      look_up(buffer_, target_.fixed_frame, sensor, instants.front(), &placement->X_FS);
   placement->X_FS_end = placement->X_FS;
   if (problem.empty() && instants.size() > 1) {
-    problem = look_up(buffer_, target.fixed_frame, sensor, instants.back(), &placement->X_FS_end);
+    problem = look_up(buffer_, target_.fixed_frame, sensor, instants.back(), &placement->X_FS_end);
   }
   if (!problem.empty() || !config_.ingest.self_filter) return problem;
-  placement->known.assign(target.model->links.size(), true);
-  const std::size_t count = target.model->links.size();
-  FilterPoses last;
-  last.X_FL.assign(count, Eigen::Isometry3d::Identity());
-  last.known.assign(count, false);
-  last.solid.assign(count, 0);
+  placement->known.assign(target_.model->links.size(), true);
+  std::vector<std::size_t> last(target_.model->links.size(), kNowhere);
   for (std::size_t i = 0; i < instants.size(); ++i) {
-    pose_robot(target, instants[i], i, &last, placement);
+    pose_robot(instants[i], i, &last, placement);
   }
   return "";
 }
