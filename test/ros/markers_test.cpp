@@ -215,6 +215,7 @@ TEST(UnseenMarkers, CubesNearTheRobot) {
   ASSERT_EQ(drawn.size(), 1U);
   EXPECT_EQ(drawn[0].action, Marker::ADD);
   EXPECT_EQ(drawn[0].header.frame_id, "odom");
+  EXPECT_NEAR(drawn[0].scale.x, 0.25 * 0.02, 1e-9);
   ASSERT_EQ(drawn[0].points.size(), 4U);
   EXPECT_NEAR(drawn[0].points[0].x, 1.11, 1e-9);
   EXPECT_NEAR(drawn[0].points[3].x, 1.31, 1e-9);

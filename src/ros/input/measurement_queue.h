@@ -2,7 +2,6 @@
 
 #include <ros/time.h>
 
-#include <algorithm>
 #include <cstddef>
 #include <deque>
 #include <memory>
@@ -47,13 +46,24 @@ class MeasurementQueue {
   void drop_until(std::size_t i);
 
   /// The newest measurement for which `is_ready` holds; size() where there is none. Transforms come
-  /// in order, so it asks about few.
+  /// in order, so it asks about few: those that are 1, 2, 4, ... from the newest, then by
+  /// bisection.
   template <typename Ready>
   std::size_t newest_ready(const Ready& is_ready) const {
-    const auto end = std::partition_point(waiting_.begin(), waiting_.end(),
-                                          [&](const auto& one) { return is_ready(*one); });
-    if (end == waiting_.begin()) return size();
-    return static_cast<std::size_t>(end - waiting_.begin()) - 1;
+    std::size_t not_ready = size();
+    for (std::size_t step = 1; not_ready > 0; step *= 2) {
+      std::size_t ready = not_ready > step ? not_ready - step : 0;
+      if (!is_ready(*waiting_[ready])) {
+        not_ready = ready;
+        continue;
+      }
+      while (not_ready - ready > 1) {
+        const std::size_t middle = ready + (not_ready - ready) / 2;
+        (is_ready(*waiting_[middle]) ? ready : not_ready) = middle;
+      }
+      return ready;
+    }
+    return size();
   }
 
  private:

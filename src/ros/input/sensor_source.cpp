@@ -225,11 +225,12 @@ void SensorSource::place_newest() {
     waits_since_ = now;
     return;
   }
-  const std::string wait = missing_transform(waiting_.newest());
-  const std::size_t i = wait.empty() ? waiting_.size() - 1
-                                     : waiting_.newest_ready([&](const Measurement& measurement) {
-                                         return missing_transform(measurement).empty();
-                                       });
+  std::string wait;  // why the newest waits
+  const std::size_t i = waiting_.newest_ready([&](const Measurement& measurement) {
+    const std::string problem = missing_transform(measurement);
+    if (&measurement == &waiting_.newest()) wait = problem;
+    return problem.empty();
+  });
   const std::chrono::duration<double> waits = now - waits_since_;
   if (!wait.empty() && waits.count() >= 0.5 * std::min(config_.timeout, 1.0)) {
     set_problem(wait + clock_difference(waiting_.newest()), false);

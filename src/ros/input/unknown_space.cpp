@@ -34,7 +34,7 @@ using visualization_msgs::Marker;
 
 constexpr std::size_t kMaxCubes = 20000;
 constexpr double kLargestCube = 0.05;  // [m] Larger boxes are drawn in parts.
-constexpr double kDrawn = 0.01;  // [m] of a cube's edges, so that the robot is seen through them
+constexpr double kDrawnShare = 0.25;   // of the least edge, so that the robot is seen through them
 constexpr double kGrey = 0.6;
 constexpr double kOpacity = 0.8;  // of what touches a link; nothing is left at the range's end
 
@@ -103,13 +103,15 @@ visualization_msgs::MarkerArray unseen_markers(const VoxelBoxes& boxes, const Vo
   marker.type = Marker::CUBE_LIST;
   marker.action = cubes.empty() ? Marker::DELETE : Marker::ADD;
   marker.pose.orientation.w = 1.0;
-  marker.scale.x = marker.scale.y = marker.scale.z = kDrawn;
   marker.color = grey(kOpacity);
+  double edge = kLargestCube;
   for (const Cube& cube : cubes) {
+    edge = std::min(edge, cube.box.sizes().minCoeff());
     marker.points.emplace_back();
     assign(cube.box.center(), &marker.points.back());
     marker.colors.push_back(grey(kOpacity * (1.0 - cube.distance / range)));
   }
+  marker.scale.x = marker.scale.y = marker.scale.z = kDrawnShare * edge;
   visualization_msgs::MarkerArray array;
   array.markers.push_back(std::move(marker));
   return array;

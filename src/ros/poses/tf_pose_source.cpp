@@ -44,7 +44,7 @@ void TfPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
       problem = {format_text("its newest pose is from %.3f s before the last answer",
                              seconds_between(stamps[i], poses->stamp)),
                  true};
-    } else {
+    } else if (stamps[i] > poses->stamp) {  // else its newest pose is that of the instant
       problem.text = ist::look_up(buffer_, fixed_frame_, frames_[i], poses->stamp, &poses->X_FL[i]);
     }
     poses->known[i] = problem.empty();

@@ -100,10 +100,7 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
   while (lag->windows < Lag::kMostWindows && stamp.toSec() > lag->window) {
     Eigen::Isometry3d X;
     stamp -= ros::Duration(lag->window);
-    if (!is_known(buffer, fixed, frame, stamp, nullptr) ||
-        !look_up(buffer, fixed, frame, stamp, &X).empty()) {
-      break;
-    }
+    if (!look_up(buffer, fixed, frame, stamp, &X).empty()) break;
     lag->moved[lag->windows++] = X_after * X.inverse();
     X_after = X;
   }
