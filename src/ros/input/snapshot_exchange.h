@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -57,10 +56,7 @@ class SharedChannel : public SnapshotChannel<std::shared_ptr<T>> {
  public:
   /// Makes back() the newest value. The writing thread only.
   void publish() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      shared_ = this->back();
-    }
+    std::atomic_store(&shared_, std::shared_ptr<const T>(this->back()));
     SnapshotChannel<std::shared_ptr<T>>::publish();
   }
 
@@ -72,14 +68,10 @@ class SharedChannel : public SnapshotChannel<std::shared_ptr<T>> {
   }
 
   /// The same for any other thread; valid as long as it is held.
-  std::shared_ptr<const T> share() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return shared_;
-  }
+  std::shared_ptr<const T> share() const { return std::atomic_load(&shared_); }
 
  private:
-  mutable std::mutex mutex_;
-  std::shared_ptr<const T> shared_;  ///< guarded by mutex_
+  std::shared_ptr<const T> shared_;  ///< loaded and stored atomically
 };
 
 /// Hands the snapshots of one source from its thread to the threads that query.

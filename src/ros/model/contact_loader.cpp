@@ -31,16 +31,6 @@ std::shared_ptr<const ContactGeometry> no_body(const std::string& note) {
 
 }  // namespace
 
-std::shared_ptr<const ContactModel> ContactLoader::contacts() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return contacts_;
-}
-
-void ContactLoader::set(std::shared_ptr<const ContactModel> contacts) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  contacts_ = std::move(contacts);
-}
-
 bool ContactLoader::is_current(const ModelState& state) const {
   if (is_interrupted_()) return false;
   const auto newest = loader_.state();
@@ -90,7 +80,7 @@ void ContactLoader::begin(const ModelState& state) {
     if (known != known_.end()) contacts.links[i] = bodies[keys_[i]] = known->second;
   }
   known_ = std::move(bodies);
-  set(std::make_shared<const ContactModel>(std::move(contacts)));
+  std::atomic_store(&contacts_, std::make_shared<const ContactModel>(std::move(contacts)));
 }
 
 bool ContactLoader::is_needed(const ModelState& state, std::size_t link) {
@@ -123,9 +113,9 @@ bool ContactLoader::add_next(const ModelState& state) {
     known_.erase(keys_[*next]);
     return false;
   }
-  auto more = std::make_shared<ContactModel>(*contacts);
-  more->links[*next] = body;
-  set(std::move(more));
+  ContactModel more = *contacts;
+  more.links[*next] = body;
+  std::atomic_store(&contacts_, std::make_shared<const ContactModel>(std::move(more)));
   return true;
 }
 

@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,7 +36,7 @@ class ContactLoader {
   void pack_when_due();
 
   /// The bodies made so far; null until a model is ready, and where they are not wanted.
-  std::shared_ptr<const ContactModel> contacts() const;
+  std::shared_ptr<const ContactModel> contacts() const { return std::atomic_load(&contacts_); }
 
   /// How long a volume waits for the final packing of its link.
   static constexpr std::chrono::seconds kMaxWait{10};
@@ -51,14 +50,12 @@ class ContactLoader {
   bool add_next(const ModelState& state);
   std::shared_ptr<const ContactGeometry> build(const LinkDescription& link, const LinkModel& model,
                                                const std::function<bool()>& cancelled) const;
-  void set(std::shared_ptr<const ContactModel> contacts);
   bool is_current(const ModelState& state) const;
 
   const ServerConfig config_;
   const ModelLoader& loader_;
   const std::function<bool()> is_interrupted_;
-  mutable std::mutex mutex_;
-  std::shared_ptr<const ContactModel> contacts_;  ///< guarded by mutex_
+  std::shared_ptr<const ContactModel> contacts_;  ///< loaded and stored atomically
   // The thread's own.
   /// The bodies of this model and the last one by key.
   std::map<std::string, std::shared_ptr<const ContactGeometry>> known_;

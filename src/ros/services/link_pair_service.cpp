@@ -57,8 +57,7 @@ void LinkPairService::sample_newest() {
   findings.chosen = choose_pairs(model, [&] { return is_outdated(*model); }).all;
   findings.problem = "the pairs are being sampled";
   const auto show = [&] {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    findings_ = std::make_shared<const Findings>(findings);
+    std::atomic_store(&findings_, std::make_shared<const Findings>(findings));
   };
   show();
   sample(&findings);
@@ -127,11 +126,7 @@ std::string LinkPairService::left_out_though_apart(const Findings& findings) {
 }
 
 bool LinkPairService::answer(Service::Request& request, Service::Response& response) {
-  std::shared_ptr<const Findings> findings;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    findings = findings_;
-  }
+  const std::shared_ptr<const Findings> findings = std::atomic_load(&findings_);
   if (!findings || is_outdated(*findings->model)) {
     const auto model = loader_.state();
     response.message = !model->is_ready()  ? model->problem

@@ -4,7 +4,6 @@
 #include <ros/node_handle.h>
 
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -44,9 +43,9 @@ class LinkPairService {
 
   const ServerConfig config_;
   const ModelLoader& loader_;
-  std::shared_ptr<const ModelState> model_;   ///< of the last sampling; the thread's own
-  std::mutex mutex_;                          ///< guards the next one
-  std::shared_ptr<const Findings> findings_;  ///< null before the first model
+  std::shared_ptr<const ModelState> model_;  ///< of the last sampling; the thread's own
+  /// Null before the first model; loaded and stored atomically.
+  std::shared_ptr<const Findings> findings_;
   ros::ServiceServer service_;
   CallbackThread thread_;
 };
