@@ -199,7 +199,7 @@ void ProximityServer::Impl::publish(const ist_proximity::ProximityArrayConstPtr&
     efforts.status = message->status;
     efforts.status_text = message->status_text;
     if (has_cycle) {
-      cycle_->fill_joint_repulsion(*message, summary_.self_problem(), self.get(), &efforts);
+      cycle_->fill_joint_repulsion(summary_.self_problem(), self.get(), &efforts);
     }
     publish_message(joint_repulsion_, efforts);
   }

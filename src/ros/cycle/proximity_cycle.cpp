@@ -388,14 +388,13 @@ MarkerScene ProximityCycle::marker_scene() const {
   return scene;
 }
 
-void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,
-                                          const std::string& self_problem,
+void ProximityCycle::fill_joint_repulsion(const std::string& self_problem,
                                           const ProximityArray* self,
                                           ist_proximity::JointRepulsion* message) {
   all_pushes_ = pushes_;
   for (const std::size_t i : model_->paired) all_pushes_[i] = RepulsiveWrench();
   if (self_counts_) add_self_repulsion(self_problem.empty() ? self : nullptr);
-  joint_repulsion_.fill(pose_source_.get(), all_pushes_, proximity, message);
+  joint_repulsion_.fill(pose_source_.get(), all_pushes_, message);
   if (!self_counts_ || message->status != ProximityArray::OK) return;
   const bool is_known = self_problem.empty() && self != nullptr;
   if (is_known && self->status == ProximityArray::OK) return;

@@ -101,12 +101,11 @@ class ProximityCycle {
   MarkerScene marker_scene() const;
 
   /// Gives the repulsion of the last run() as joint efforts.
-  /// @param proximity     the message of that run()
   /// @param self_problem  with ~self_collision/in_minimum: why `self` cannot be used; else empty
   /// @param self          the newest ~self_proximity, whose repulsion is added with
   ///                      ~self_collision/in_minimum; may be null
-  void fill_joint_repulsion(const ist_proximity::ProximityArray& proximity,
-                            const std::string& self_problem,
+  /// @param message       has the stamp and the status of the message of that run()
+  void fill_joint_repulsion(const std::string& self_problem,
                             const ist_proximity::ProximityArray* self,
                             ist_proximity::JointRepulsion* message);
 

@@ -18,19 +18,13 @@ JointRepulsion::JointRepulsion(const ModelState& model)
 }
 
 void JointRepulsion::fill(PoseSource* source, const std::vector<RepulsiveWrench>& pushes,
-                          const ist_proximity::ProximityArray& proximity,
                           ist_proximity::JointRepulsion* message) {
-  message->header.stamp = proximity.header.stamp;
-  message->status = proximity.status;
-  message->status_text = proximity.status_text;
-  message->joints.clear();
-  message->effort.clear();
   if (!kinematics_ || source == nullptr) {
     message->status = ist_proximity::ProximityArray::MODEL_ERROR;
     message->status_text = problem_;
     return;
   }
-  source->look_up_all(*kinematics_, proximity.header.stamp, &bodies_);
+  source->look_up_all(*kinematics_, message->header.stamp, &bodies_);
   const auto& joints = kinematics_->joints();
   effort_.setZero(static_cast<Eigen::Index>(joints.size()));
   for (std::size_t i = 0; i < index_.size(); ++i) {

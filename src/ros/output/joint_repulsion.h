@@ -23,13 +23,13 @@ class JointRepulsion {
   /// @param model  ready
   explicit JointRepulsion(const ModelState& model);
 
-  /// @param source     its last look_up() gave the poses of the repulsion; null where the
-  ///                   kinematics is faulty
-  /// @param pushes     repulsion by link of the robot
-  /// @param proximity  message for the same poses, for the header and the status
-  /// @param message    overwritten
+  /// @param source   its last look_up() gave the poses of the repulsion; null where the kinematics
+  ///                 is faulty
+  /// @param pushes   repulsion by link of the robot
+  /// @param message  has the stamp and the status of ~proximity for these poses; receives the
+  ///                 efforts, and where an OK is none for them, why
   void fill(PoseSource* source, const std::vector<RepulsiveWrench>& pushes,
-            const ist_proximity::ProximityArray& proximity, ist_proximity::JointRepulsion* message);
+            ist_proximity::JointRepulsion* message);
 
  private:
   /// Adds the efforts of one link.
