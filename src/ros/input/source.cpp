@@ -174,24 +174,23 @@ std::string Source::place(const SnapshotRequest& request, const SourceSnapshot& 
   std::string ended = ended_zone(original, ros::Time::now());
   if (!ended.empty()) return ended;
   if (!is_placed_when_asked_) return buffer_.dispute(original.fixed_frame, original.map_frame);
-  SourceSnapshot* const snapshot = placed;
-  std::vector<Eigen::Isometry3d>& X_FB = snapshot->world.X_FB;
-  snapshot->lags.resize(X_FB.size() + (snapshot->cloud.boxes ? 1 : 0));
+  std::vector<Eigen::Isometry3d>& X_FB = placed->world.X_FB;
+  placed->lags.resize(X_FB.size() + (original.cloud.boxes ? 1 : 0));
   const auto place_frame = [&](const std::string& frame, Lag* lag, Eigen::Isometry3d* X) {
     X->setIdentity();
     if (frame == kFixedFrame) return std::string();
-    return look_up_near(buffer_, snapshot->fixed_frame, frame, request.time, request.max_age, X,
+    return look_up_near(buffer_, original.fixed_frame, frame, request.time, request.max_age, X,
                         lag);
   };
   for (std::size_t i = 0; i < X_FB.size(); ++i) {
     const std::string problem =
-        place_frame(snapshot->world.world->frames()[i], &snapshot->lags[i], &X_FB[i]);
+        place_frame(original.world.world->frames()[i], &placed->lags[i], &X_FB[i]);
     if (!problem.empty()) return problem;
   }
-  if (!snapshot->cloud.boxes) return "";
+  if (!original.cloud.boxes) return "";
   Eigen::Isometry3d X_FM;
-  const std::string problem = place_frame(snapshot->map_frame, &snapshot->lags.back(), &X_FM);
-  if (problem.empty()) snapshot->cloud.X_FM = X_FM * snapshot->X_BM;
+  const std::string problem = place_frame(original.map_frame, &placed->lags.back(), &X_FM);
+  if (problem.empty()) placed->cloud.X_FM = X_FM * original.X_BM;
   return problem;
 }
 

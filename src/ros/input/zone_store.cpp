@@ -87,10 +87,8 @@ std::vector<std::shared_ptr<LiveZone>> ZoneStore::newest(const ros::Time& now) c
 std::string ZoneStore::look_up_zone(const std::string& fixed_frame, const LiveZone& zone,
                                     const ros::Time& time, Eigen::Isometry3d* X_FB) const {
   const std::string frame = without_slash(zone.config().frame);
-  std::string problem;
-  if (is_known(buffer_, fixed_frame, frame, time, &problem)) {
-    return look_up(buffer_, fixed_frame, frame, time, X_FB);
-  }
+  std::string problem = look_up(buffer_, fixed_frame, frame, time, X_FB);
+  if (problem.empty()) return "";
   ros::Time stamp;
   std::string late = look_up_newest(buffer_, fixed_frame, frame, time, max_age_, X_FB, &stamp);
   return late.empty() && stamp > time ? problem : late;

@@ -63,8 +63,8 @@ void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinema
     index_[joint.name] = j;
     if (joint.type == JointType::kFixed) {
       put_into_tf(j, 0.0, ros::Time(), urdf_);
-    } else if (!joint.has_unstated_pose()) {
-      if (joint.source != j) led_by_[joint.source].push_back(j);
+    } else if (!joint.has_unstated_pose() && joint.source != j) {
+      led_by_[joint.source].push_back(j);
     }
   }
 }
