@@ -132,9 +132,7 @@ void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Pu
         return warm_up_.run(source, fresh);
       }));
   sources_.push_back(inputs_.back());
-  if (!memory) return;
-  memory->set_parent(sources_.back().get());
-  sources_.push_back(memory);
+  if (memory) sources_.push_back(memory);
 }
 
 /// Waits until a joint state comes, but not for ever. Joint states that came during the last cycle

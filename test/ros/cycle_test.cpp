@@ -259,8 +259,8 @@ TEST(Vouching, NeedsAFreshSourceThatMeasures) {
       report.required = source.required;
       report.messages = 1;
       report.newest = source.ok ? 100.0 : 90.0;
+      report.status = source.ok ? Status{kOk, ""} : Status{kStale, "is old"};
       input.sources.push_back(report);
-      input.source_statuses.push_back(source.ok ? Status{kOk, ""} : Status{kStale, "is old"});
     }
     EXPECT_EQ(decide(find_all(input, 100.0), true).code, cases[k].status) << "case " << k;
     EXPECT_EQ(clouds_usable(input), cases[k].status == kOk) << "case " << k;

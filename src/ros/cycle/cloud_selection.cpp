@@ -10,23 +10,13 @@
 namespace ist {
 namespace {
 
-/// The number of the source whose memory a source is; its own, where it is none.
-std::size_t parent_of(const CloudSources& sources, std::size_t source) {
-  const ObstacleSource* parent = sources[source]->parent();
-  for (std::size_t i = 0; parent != nullptr && i < source; ++i) {
-    if (sources[i].get() == parent) return i;
-  }
-  return source;
-}
-
 /// Whether what a source has counts as an obstacle: where others vouch for what is free, also what
 /// is left of an incomplete source, and what a silent one remembers.
 bool is_obstacle(std::size_t source, const StatusInput& status) {
-  const Status& own = status.source_statuses[source];
   const SourceReport& report = status.sources[source];
   const bool is_incomplete =
-      own.code == ist_proximity::ProximityArray::NO_CLOUD && !report.incomplete.empty();
-  return own.ok() || is_incomplete || report.is_memory;
+      report.status.code == ist_proximity::ProximityArray::NO_CLOUD && !report.incomplete.empty();
+  return report.status.ok() || is_incomplete || report.is_memory;
 }
 
 }  // namespace
@@ -34,7 +24,6 @@ bool is_obstacle(std::size_t source, const StatusInput& status) {
 void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
                             const SnapshotRequest& request, StatusInput* status) {
   status->sources.resize(sources.size());
-  status->source_statuses.resize(sources.size());
   selected_.clear();
   held_.clear();
   for (std::size_t i = 0; i < sources.size(); ++i) {
@@ -50,9 +39,8 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       report.ingest_time = snapshot->cloud.ingest_time;
     }
     const std::size_t parent = parent_of(sources, i);
-    status->source_statuses[i] = parent == i
-                                     ? source_status(report, now.toSec())
-                                     : memory_status(report, status->source_statuses[parent]);
+    report.status = parent == i ? source_status(report, now.toSec())
+                                : memory_status(report, status->sources[parent].status);
     selected_.push_back(snapshot);
   }
 

@@ -47,8 +47,7 @@ std::vector<std::string> faulty_links(const RobotModel& robot,
 void fill_status(const StatusInput& input, const Status& status, ProximityArray* message) {
   message->sources.resize(input.sources.size());
   for (std::size_t i = 0; i < input.sources.size(); ++i) {
-    assign_source(input.sources[i], input.source_statuses[i], message->header.stamp,
-                  &message->sources[i]);
+    assign_source(input.sources[i], message->header.stamp, &message->sources[i]);
   }
   message->status = status.code;
   message->status_text = status.text;
@@ -63,7 +62,7 @@ void fill_without_model(const ModelState& model, const ServerConfig& config, con
   for (const auto& source : sources) {
     input.sources.emplace_back();
     source->report(&input.sources.back());
-    input.source_statuses.push_back(source_status(input.sources.back(), now.toSec()));
+    input.sources.back().status = source_status(input.sources.back(), now.toSec());
   }
   *message = ProximityArray();
   message->header.stamp = now;

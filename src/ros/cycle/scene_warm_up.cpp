@@ -1,6 +1,5 @@
 #include "ros/cycle/scene_warm_up.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "ist_proximity/repulsion/repulsion.h"
@@ -81,34 +80,21 @@ void SceneWarmUp::end() {
 bool SceneWarmUp::select_clouds(const ObstacleSource& source, const SourceSnapshot& fresh) {
   clouds_.clear();
   bool is_part = false;
-  for (const int i : scene_.sources) {
-    const ObstacleSource& one = *sources_[static_cast<std::size_t>(i)];
-    const SourceSnapshot* snapshot = nullptr;
-    if (&one == &source) {
-      snapshot = &fresh;
+  for (const int number : scene_.sources) {
+    const auto i = static_cast<std::size_t>(number);
+    const std::size_t parent = parent_of(sources_, i);
+    const SourceSnapshot* snapshot = &fresh;
+    if (sources_[parent].get() != &source) {  // held until the warm-up ends
+      held_.push_back(sources_[parent]->share(scene_.request));
+      snapshot = held_.back().get();
+    } else if (parent == i) {
       is_part = true;
-    } else if (one.parent() == &source) {
-      snapshot = fresh.memory.get();
-    } else {
-      snapshot = share(one);
     }
+    if (snapshot != nullptr && parent != i) snapshot = snapshot->memory.get();
     if (snapshot == nullptr) return false;
     add_clouds(*snapshot, &clouds_);
   }
   return is_part;
-}
-
-/// The newest snapshot of another source, held until the warm-up ends.
-const SourceSnapshot* SceneWarmUp::share(const ObstacleSource& source) {
-  const ObstacleSource* const shared = source.parent() != nullptr ? source.parent() : &source;
-  const auto found = std::find_if(
-      sources_.begin(), sources_.end(),
-      [shared](const std::shared_ptr<ObstacleSource>& s) { return s.get() == shared; });
-  if (found == sources_.end()) return nullptr;
-  held_.push_back((*found)->share(scene_.request));
-  const SourceSnapshot* const snapshot = held_.back().get();
-  if (snapshot == nullptr || shared == &source) return snapshot;
-  return snapshot->memory.get();
 }
 
 }  // namespace ist

@@ -63,7 +63,6 @@ class SceneWarmUp {
   std::unique_ptr<CoherentQueries> take_spare(std::uint64_t* generation);
   void give_back(std::unique_ptr<CoherentQueries> queries, std::uint64_t generation);
   bool select_clouds(const ObstacleSource& source, const SourceSnapshot& fresh);
-  const SourceSnapshot* share(const ObstacleSource& source);
 
   const CloudSources& sources_;
 

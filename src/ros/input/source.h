@@ -48,12 +48,17 @@ class ObstacleSource {
   /// the memory of its strings. Thread safe.
   virtual void report(SourceReport* report) = 0;
 
-  /// The source with whose snapshots this one's come while they are fresh, as
-  /// SourceSnapshot::memory; null: none. The parent comes first in CloudSources.
-  virtual const ObstacleSource* parent() const { return nullptr; }
+  /// Whether it is what the source just before it in CloudSources remembers, with whose snapshots
+  /// its own come while those are fresh, as SourceSnapshot::memory.
+  virtual bool is_memory() const { return false; }
 };
 
 using CloudSources = std::vector<std::shared_ptr<ObstacleSource>>;
+
+/// The number of the source whose memory a source is; its own, where it is none.
+inline std::size_t parent_of(const CloudSources& sources, std::size_t source) {
+  return sources[source]->is_memory() ? source - 1 : source;
+}
 
 /// The frame of what stands still in the fixed frame, whatever that is.
 constexpr const char* kFixedFrame = "(fixed frame)";

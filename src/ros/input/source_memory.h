@@ -34,9 +34,7 @@ class SourceMemory : public ObstacleSource {
   /// @param wants_body  whether the space that the robot takes up has to be known (~unknown_space)
   SourceMemory(const SourceConfig& config, bool wants_body, const ros::Publisher& publisher);
 
-  /// Sets the source whose memory this is, before either is used; it outlives this.
-  void set_parent(const ObstacleSource* parent) { parent_ = parent; }
-  const ObstacleSource* parent() const override { return parent_; }
+  bool is_memory() const override { return true; }
 
   // The source's thread only.
 
@@ -103,7 +101,6 @@ class SourceMemory : public ObstacleSource {
   const SourceConfig config_;
   const bool wants_body_;
   ros::Publisher publisher_;
-  const ObstacleSource* parent_ = nullptr;
 
   // Used by the source's thread alone.
   MemoryScan scan_;

@@ -11,6 +11,13 @@
 
 namespace ist {
 
+/// A status constant of ProximityArray, and a sentence unless it is OK.
+struct Status {
+  std::uint8_t code;
+  std::string text;
+  bool ok() const { return code == 0; }
+};
+
 /// All that the status of a source depends on. Times are seconds of the ROS clock; counts begin at
 /// the start, the number of messages also when the clock jumps back.
 struct SourceReport {
@@ -73,6 +80,8 @@ struct SourceReport {
   std::size_t memory_voxels = 0, memory_occupied = 0;  ///< of a memory
   ViewReport view;                                     ///< of a self-filter by view
   std::vector<std::string> view_links;                 ///< names of view.links
+
+  Status status{0, ""};  ///< what follows from all that; whoever asks for the report decides it
 };
 
 /// A sentence when the points on the robot say that the sensor's pose in tf is wrong; else empty.

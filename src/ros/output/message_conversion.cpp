@@ -100,12 +100,12 @@ void assign_unknown_space(const SeenShare& seen, double lower_bound,
   message->lower_bound = lower_bound;
 }
 
-void assign_source(const SourceReport& source, const Status& status, const ros::Time& stamp,
+void assign_source(const SourceReport& source, const ros::Time& stamp,
                    ist_proximity::SourceStatus* message) {
   const bool has = source.has_snapshot;
   const IngestCounts counts = has ? source.counts : IngestCounts();
   message->name = source.name;
-  message->status = status.code;
+  message->status = source.status.code;
   message->stamp = has ? source.stamp : ros::Time();
   message->age = has && !source.is_file ? seconds_between(source.counts_from, stamp) : kNaN;
   message->points_received = counts.received;

@@ -16,7 +16,6 @@
 #include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/input/source_report.h"
-#include "ros/status/status.h"
 
 namespace ist {
 
@@ -50,7 +49,7 @@ void assign_unknown_space(const SeenShare& seen, double lower_bound,
 
 /// Makes the message of a source, as assign_link() does.
 /// @param stamp  of the ProximityArray, from which `age` counts
-void assign_source(const SourceReport& source, const Status& status, const ros::Time& stamp,
+void assign_source(const SourceReport& source, const ros::Time& stamp,
                    ist_proximity::SourceStatus* message);
 
 /// Whether a message says that a source which is required cannot be used, so that nothing is known,

@@ -25,7 +25,6 @@ double CycleTimes::quantile(double q) const {
 void CycleReport::take(const StatusInput& input, const Findings& found, const Status& decided) {
   status = decided;
   sources = input.sources;
-  source_statuses = input.source_statuses;
   findings = found;
 }
 

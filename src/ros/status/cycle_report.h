@@ -43,7 +43,6 @@ struct CycleReport {
   Status status{0, ""};
   Findings findings;  ///< of the last cycle, and what the diagnostics add
   std::vector<SourceReport> sources;
-  std::vector<Status> source_statuses;           ///< by source
   std::string parameter_problem;                 ///< LiveParameters::problem()
   std::optional<JointStateReport> joint_states;  ///< null with pose_source tf
   std::size_t links_known = 0, links_monitored = 0;

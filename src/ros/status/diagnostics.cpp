@@ -155,10 +155,9 @@ std::string millimetres(double metres) { return format_text("%.2f mm", 1e3 * met
 
 void add_remarks(double rate, double wanted_rate, CycleReport* report) {
   Findings* findings = &report->findings;
-  for (std::size_t i = 0; i < report->sources.size(); ++i) {
-    const SourceReport& source = report->sources[i];
+  for (const SourceReport& source : report->sources) {
     const std::string what = "input " + source.name;
-    if (report->source_statuses[i].ok() && !source.problem.empty()) {
+    if (source.status.ok() && !source.problem.empty()) {
       note(Rank::kRemark, what, "the newest " + source.noun + " is not in use: " + source.problem,
            findings);
     }

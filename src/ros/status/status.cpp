@@ -29,10 +29,9 @@ struct Vouchers {
       measures |= source.measures;
       has_measured |= source.measures && source.has_been_there;
     }
-    for (std::size_t i = 0; i < input.sources.size(); ++i) {
-      const bool is_ok = input.source_statuses[i].ok();
-      any_ok |= is_ok && can_vouch(input.sources[i]);
-      all_required_ok &= is_ok || !input.sources[i].required;
+    for (const SourceReport& source : input.sources) {
+      any_ok |= source.status.ok() && can_vouch(source);
+      all_required_ok &= source.status.ok() || !source.required;
     }
   }
   /// Whether a source says what is free, while it is OK.
@@ -59,9 +58,8 @@ Rank rank_of(const SourceReport& source, const Vouchers& vouchers, bool has_mode
 
 void note_sources(const StatusInput& input, double now, Findings* findings) {
   const Vouchers vouchers(input);
-  for (std::size_t i = 0; i < input.sources.size(); ++i) {
-    const SourceReport& source = input.sources[i];
-    const Status& status = input.source_statuses[i];
+  for (const SourceReport& source : input.sources) {
+    const Status& status = source.status;
     const std::string& doubt = source.doubt_of_place;
     if (status.ok() && doubt.empty()) continue;
     const std::string what = "input " + source.name;

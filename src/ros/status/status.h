@@ -11,13 +11,6 @@ namespace ist {
 
 // Pure functions that decide the status constants of ProximityArray and their texts.
 
-/// A status constant of ProximityArray, and a sentence unless it is OK.
-struct Status {
-  std::uint8_t code;
-  std::string text;
-  bool ok() const { return code == 0; }
-};
-
 /// Decides NO_CLOUD, STALE_CLOUD or OK for one source; only a source that is OK says what is free.
 /// @param now  [s] ROS clock
 Status source_status(const SourceReport& source, double now);
@@ -73,7 +66,6 @@ struct StatusInput {
   Findings findings;      ///< but for those of the members below
   bool has_model = true;  ///< false: there is no model, or not all of it (yet)
   std::vector<SourceReport> sources;
-  std::vector<Status> source_statuses;  ///< by source
   DeadlineCost deadline;
   bool clock_runs = true;  ///< false: simulated time, and nothing on /clock yet
 };
