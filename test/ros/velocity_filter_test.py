@@ -472,6 +472,46 @@ class VelocityFilterTest(unittest.TestCase):
         self.world.repeat(50, answer_nothing)
         self.check_fault("of no link: no URDF yet")
 
+    def test_joints_that_are_commanded_apart(self):
+        """What is not commanded any more stands, also while other joints go on."""
+        self.robot.function = lambda: self.send_joints(np.zeros(2))
+        self.start(0.1, 0.1, command_type="sensor_msgs/JointState")
+        self.wait_for(FilterState.FREE)
+        names = list(JOINTS)
+
+        def command_each():
+            for name in list(names):
+                self.filter.publisher.publish(JointState(name=[name], velocity=[0.1]))
+
+        def speeds():
+            return {n: v for m in list(self.filter.given) for n, v in zip(m.name, m.velocity)}
+
+        self.filter.given.clear()
+        self.commands.function = command_each
+        pt.wait_until(lambda: speeds() == {"along": 0.1, "across": 0.1}, "both joints to go")
+        names.remove("along")
+        pt.wait_until(lambda: speeds() == {"along": 0.0, "across": 0.1}, "one joint to stand")
+        # It is told so for a while.
+        pt.wait_until(
+            lambda: all(s.status == FilterState.FREE for s in self.filter.states[-30:]), "the end of it"
+        )
+        self.commands.paused = True
+        pt.wait_until(lambda: speeds() == {"along": 0.0, "across": 0.0}, "the other one to stand")
+
+    def test_robot_that_is_read_again(self):
+        self.robot.function = lambda: self.send_joints(np.zeros(2))
+        self.world.points = wall() - [0.7, 0.0, 0.0]  # 0.2 m from the ball
+        self.start(2.0, 0.0)
+        self.wait_for(FilterState.LIMITED)
+        turned = SLIDES.replace('<axis xyz="1 0 0"/>', '<axis xyz="-1 0 0"/>')
+        rospy.set_param(self.namespace + "/robot_description", turned)
+        self.assertTrue(self.node.reload().success)
+        self.wait_for(FilterState.FREE)
+        self.wanted = (-2.0, 0.0)
+        state = self.wait_for(FilterState.LIMITED)
+        self.assertEqual(list(state.command), [-2.0, 0.0])
+        self.assertGreater(state.velocity[0], -2.0)
+
     def test_stamps_that_are_ahead(self):
         """As long as they lie ahead, nobody could tell that no more come."""
         ahead = rospy.Duration(0.8)

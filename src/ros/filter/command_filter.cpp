@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 #include "internal/geometry/numbers.h"
 #include "ist_proximity/geometry/error.h"
@@ -31,6 +33,8 @@ constexpr double kMaxSpeed = 10.0;
 constexpr double kTimeLimit = 0.0005;
 // Zeros where commands or data are late come this often, as commands do.
 const ros::WallDuration kZeroPeriod(0.01);
+// [s] For so long, joints that are not commanded any more are given 0 beside others that are.
+constexpr double kHalted = 0.5;
 // Time in which the last velocity leaves: roscpp sends by another thread, and drops what a
 // publisher has not sent when it goes.
 const ros::WallDuration kLeave(0.1);
@@ -63,23 +67,23 @@ void publish_scale(double scale, const ros::Publisher& publisher) {
 }  // namespace
 
 CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
-    : nh_(nh), private_nh_(private_nh), config_(read_config(private_nh)), listener_(tf_, nh_) {
+    : nh_(nh),
+      private_nh_(private_nh),
+      config_(read_config(private_nh)),
+      listener_(tf_, nh_),
+      joints_are_stated_(!config_.joints.empty()) {
   if (!nh_.searchParam("robot_description", description_)) description_ = "robot_description";
   state_ = private_nh_.advertise<FilterState>("filter_state", 10);
   scale_ = private_nh_.advertise<std_msgs::Float64>("speed_scale", 10);
   markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("filter_markers", 1);
   read_robot();
   const auto hints = ros::TransportHints().tcpNoDelay();
-  const auto take_into = [this](PlacedAnswers* placed) {
-    return boost::function<void(const ist_proximity::ProximityArray::ConstPtr&)>(
-        [this, placed](const ist_proximity::ProximityArray::ConstPtr& answers) {
-          take(answers, placed);
-        });
-  };
   if (config_.self_proximity) {
-    self_answers_ = nh_.subscribe("proximity/self_proximity", 1, take_into(&self_), {}, hints);
+    self_answers_ = nh_.subscribe<ist_proximity::ProximityArray>(
+        "proximity/self_proximity", 1, [this](const auto& answers) { take(answers, &self_); }, {},
+        hints);
   }
-  answers_ = nh_.subscribe("proximity/proximity", 1, take_into(&obstacles_), {}, hints);
+  answers_ = nh_.subscribe("proximity/proximity", 1, &CommandFilter::take_answers, this, hints);
   joints_ = nh_.subscribe("joint_states", 50, &CommandFilter::take_joints, this, hints);
   node_scale_ = nh_.subscribe("proximity/speed_scale", 1, &CommandFilter::take_scale, this, hints);
   subscribe<trajectory_msgs::JointTrajectory, std_msgs::Float64MultiArray, sensor_msgs::JointState,
@@ -91,7 +95,7 @@ CommandFilter::~CommandFilter() {
   timer_.stop();
   command_.shutdown();
   publish_scale(0.0, scale_);
-  if (halt_) halt_("the filter ends");
+  halt("the filter ends");
   kLeave.sleep();
 }
 
@@ -135,9 +139,17 @@ void CommandFilter::receive(const Message& message) {
   last_command_ = state.header.stamp;
   publish_scale(given_scale_, scale_);
   // Nobody could use 0 for joints that the robot lacks: those that were commanded before stop.
-  if (halt_ && !can_be_used(command)) return halt_(state.status_text);
+  const bool is_usable = can_be_used(command);
+  if (!is_usable && !groups_.empty()) {
+    for (Group& group : groups_) group.last_command = last_command_;
+    return halt(state.status_text);
+  }
   give(velocity, &state, std::chrono::duration<double>(Clock::now() - begin).count());
-  halt_ = [this, give, command](const std::string& reason) {
+  Group group;
+  group.last_command = last_command_;
+  if (is_usable) group.joints = command.joints;
+  std::sort(group.joints.begin(), group.joints.end());
+  group.halt = [this, give, command](const std::string& reason) {
     FilterState none;
     none.header.stamp = ros::Time::now();
     none.header.frame_id = kinematics_ ? kinematics_->bodies()[0] : "";
@@ -147,11 +159,42 @@ void CommandFilter::receive(const Message& message) {
     if (filter_) filter_->reset();
     give(std::vector<double>(command.joints.size(), 0.0), &none, 0.0);
   };
+  // Joints that this command does not name go on, and stop in their own time. Twists replace all.
+  const auto is_replaced = [&](const Group& other) {
+    return command.jacobian.size() > 0 || std::includes(group.joints.begin(), group.joints.end(),
+                                                        other.joints.begin(), other.joints.end());
+  };
+  groups_.erase(std::remove_if(groups_.begin(), groups_.end(), is_replaced), groups_.end());
+  groups_.push_back(std::move(group));
 }
 
+void CommandFilter::halt(const std::string& reason) {
+  for (const Group& group : groups_) group.halt(reason);
+}
+
+/// Gives 0 for joints whose last command is too old; others may be commanded still.
+void CommandFilter::halt_late(const ros::Time& now) {
+  const auto age = [&now](const Group& group) { return seconds_between(group.last_command, now); };
+  for (const Group& group : groups_) {
+    if (age(group) <= config_.command_timeout) continue;
+    group.halt(format_text("the last command came %.2f s ago; ~command_timeout is %g s", age(group),
+                           config_.command_timeout));
+  }
+  if (groups_.empty()) return;
+  const auto last = std::prev(groups_.end());
+  const auto has_halted = [&](const Group& group) {
+    return age(group) > config_.command_timeout + kHalted;
+  };
+  groups_.erase(std::remove_if(groups_.begin(), last, has_halted), last);
+}
+
+/// Reads the URDF, or another one that has taken its place since.
 void CommandFilter::read_robot() {
   std::string urdf;
-  if (!nh_.getParam(description_, urdf)) {
+  if (kinematics_) {
+    if (!nh_.getParamCached(description_, urdf) || urdf == urdf_) return;
+    forget_robot();
+  } else if (!nh_.getParam(description_, urdf)) {
     robot_fault_ = "waiting for the parameter '" + nh_.resolveName(description_) + "'";
     return;
   }
@@ -165,6 +208,7 @@ void CommandFilter::read_robot() {
     return;
   }
   robot_fault_.clear();
+  urdf_ = urdf;
   history_.emplace(kinematics_);
   proximity_.emplace(kinematics_);
   filter_.emplace(joint_limits(*kinematics_, kMaxSpeed), std::vector<double>(),
@@ -172,10 +216,21 @@ void CommandFilter::read_robot() {
   const std::size_t columns = proximity_->joints().size();
   command_column_.assign(columns, 0.0);
   q_column_.assign(columns, 0.0);
-  if (!config_.joints.empty()) return;
+  if (joints_are_stated_) return;
+  config_.joints.clear();
   for (const std::size_t j : proximity_->joints()) {
     config_.joints.push_back(kinematics_->joints()[j].name);
   }
+}
+
+void CommandFilter::forget_robot() {
+  halt("the robot's URDF is another one");
+  obstacles_ = self_ = PlacedAnswers();
+  given_.clear();
+  filter_.reset();
+  proximity_.reset();
+  history_.reset();
+  kinematics_.reset();
 }
 
 void CommandFilter::take_joints(const sensor_msgs::JointState& message) {
@@ -186,6 +241,13 @@ void CommandFilter::take_joints(const sensor_msgs::JointState& message) {
 void CommandFilter::take_scale(const std_msgs::Float64& scale) {
   newest_scale_ = scale.data >= 0.0 && scale.data <= 1.0 ? scale.data : 0.0;
   newest_scale_came_ = ros::Time::now();
+}
+
+void CommandFilter::take_answers(const ist_proximity::ProximityArray::ConstPtr& answers) {
+  // While the node reads its model again its status is not what it was.
+  const bool has_changed = std::exchange(newest_status_, answers->status) != answers->status;
+  if (has_changed && kinematics_) read_robot();
+  take(answers, &obstacles_);
 }
 
 void CommandFilter::take(const ist_proximity::ProximityArray::ConstPtr& answers,
@@ -222,7 +284,8 @@ bool CommandFilter::clock_has_gone_back() {
   newest_scale_ = 0.0;
   given_.clear();
   last_command_ = now;
-  if (halt_) halt_("the clock has gone back");
+  for (Group& group : groups_) group.last_command = now;
+  halt("the clock has gone back");
   return true;
 }
 
@@ -231,12 +294,11 @@ void CommandFilter::on_timer() {
   if (clock_has_gone_back()) return;
   const ros::Time now = ros::Time::now();
   const double age = seconds_between(last_command_, now);
-  if (halt_ && age <= config_.command_timeout) return;
-  const bool is_fresh = seconds_between(newest_scale_came_, now) <= config_.proximity_timeout;
-  publish_scale(is_fresh ? newest_scale_ : 0.0, scale_);
-  if (!halt_) return;
-  halt_(format_text("the last command came %.2f s ago; ~command_timeout is %g s", age,
-                    config_.command_timeout));
+  if (groups_.empty() || age > config_.command_timeout) {
+    const bool is_fresh = seconds_between(newest_scale_came_, now) <= config_.proximity_timeout;
+    publish_scale(is_fresh ? newest_scale_ : 0.0, scale_);
+  }
+  halt_late(now);
 }
 
 std::optional<std::size_t> CommandFilter::column_of(const std::string& joint) const {

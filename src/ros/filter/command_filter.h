@@ -9,6 +9,7 @@
 #include <visualization_msgs/MarkerArray.h>
 #include <xmlrpcpp/XmlRpc.h>
 
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -66,6 +67,11 @@ class CommandFilter {
   template <class Message>
   void receive(const Message& message);
   void read_robot();
+  void forget_robot();
+  /// Gives 0 for all joints that have been commanded.
+  void halt(const std::string& reason);
+  void halt_late(const ros::Time& now);
+  void take_answers(const ist_proximity::ProximityArray::ConstPtr& answers);
   void take(const ist_proximity::ProximityArray::ConstPtr& answers, PlacedAnswers* placed);
   void take_joints(const sensor_msgs::JointState& message);
   void take_scale(const std_msgs::Float64& scale);
@@ -97,6 +103,9 @@ class CommandFilter {
 
   std::shared_ptr<const Kinematics> kinematics_;  ///< null: no URDF yet
   std::string robot_fault_;                       ///< why there is none
+  std::string urdf_;
+  bool joints_are_stated_;          ///< by ~joints
+  std::uint8_t newest_status_ = 0;  ///< of the node's answers
   std::optional<JointHistory> history_;
   std::optional<ProximityRows> proximity_;
   std::optional<VelocityFilter> filter_;
@@ -116,8 +125,13 @@ class CommandFilter {
   double given_scale_ = 0.0;   ///< of the last command
   double newest_scale_ = 0.0;  ///< the node's, without a command
   ros::Time newest_scale_came_;
-  /// Gives 0 for the joints of the last command, for a reason; empty: there has been none.
-  std::function<void(const std::string&)> halt_;
+  /// Joints that have been commanded together.
+  struct Group {
+    std::vector<std::string> joints;  ///< sorted; none where the command could not be used
+    ros::Time last_command;
+    std::function<void(const std::string&)> halt;  ///< gives 0 for them, for a reason
+  };
+  std::vector<Group> groups_;  ///< that of the last command is the last; empty: there was none
 };
 
 }  // namespace ist
