@@ -100,6 +100,8 @@ class AttachedTest(unittest.TestCase):
             start=begin,
         )
         self.wait_for_ball(0.2 - TOOL_RADIUS, 200)
+        for m in node.messages[begin:]:
+            self.assertEqual([one.link for one in m.links], ["ball_link", "box_link"], m.status_text)
         self.detach_well("tool")
         self.wait_for_ball(without, 0)
 

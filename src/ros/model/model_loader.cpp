@@ -44,6 +44,12 @@ std::shared_ptr<const ModelState> ModelLoader::state() const {
 }
 
 void ModelLoader::set_state(ModelState state) {
+  if (state.phase == ModelState::Phase::kReading) {
+    // Until the URDF is read, the links of the last one are told, as UNKNOWN.
+    const auto before = this->state();
+    state.links = before->links;
+    state.root_link = before->root_link;
+  }
   auto shared = std::make_shared<const ModelState>(std::move(state));
   const std::lock_guard<std::mutex> lock(mutex_);
   // After reload() the states of the interrupted load must not appear.
