@@ -276,9 +276,16 @@ void WorldBuilder::clear() {
   triangles_ = shapes_ = 0;
 }
 
+std::shared_ptr<const KnownWorld> KnownWorld::in_frames(const std::vector<bool>& frames) const {
+  auto world = std::make_shared<KnownWorld>(*this);
+  const auto is_left_out = [&](const Object& object) { return !frames[object.frame]; };
+  std::vector<Object>& objects = world->objects_;
+  objects.erase(std::remove_if(objects.begin(), objects.end(), is_left_out), objects.end());
+  return world;
+}
+
 std::shared_ptr<const KnownWorld> WorldBuilder::world() const {
   auto world = std::make_shared<KnownWorld>();
-  world->triangles_ = triangles_;
   world->objects_.reserve(entries_.size());
   std::map<std::string, std::size_t> frames;
   for (const auto& [name, entry] : entries_) {

@@ -108,6 +108,22 @@ class FaultsSensorTest(faults.FaultTest):
         for message in node.messages[begin + 30 : begin + 60]:
             self.assertEqual(message.status, ProximityArray.OK, message.status_text)
 
+    def test_two_sensors_on_one_topic(self):
+        """Each cloud would hide what the other sensor sees."""
+        self.world.poses["other_camera"] = ("base", pt.transform((0.2, -0.3, 0.1)))
+        node = self.start()
+        count = [0]
+
+        def by_turns(message):
+            count[0] += 1
+            if count[0] % 2 == 0:
+                message.header.frame_id = "other_camera"
+
+        self.sensor.change = by_turns
+        node.wait_for_status(ProximityArray.STALE_CLOUD, "by turns in the frames")
+        self.sensor.change = None
+        node.wait_for_status(ProximityArray.OK)
+
     def test_changes_layout(self):
         """To float64 of the other byte order, which is read; to clouds that no one can read."""
         node = self.start()

@@ -311,6 +311,45 @@ class OtherRobotTest(unittest.TestCase):
             node.stop()
             world.stop()
 
+    def test_what_can_be_placed_is_left_of_an_optional_world(self):
+        """An object whose frame is not known takes no other one with it."""
+        world = pt.World("/optional").stand()
+        world.points = [[0, 0, 1.0]]
+        world.poses["carriage"] = ("base", pt.transform((0, 0.35, 0)))
+        world.start_tf()
+        world.start_clouds()
+        box = {"shape": "box", "size": [0.2, 0.2, 0.2], "position": [0.5, 0, 0]}
+        slider = {"shape": "sphere", "radius": 0.1, "frame_id": "carriage"}
+        cell = {"type": "world", "required": False, "objects": {"box": box, "slider": slider}}
+        sources = {"camera": {"topic": "cloud"}, "cell": cell}
+        node = pt.ProximityNode("/optional", {"sources": sources, "links": ["ball_link"]}, pt.urdf())
+
+        def wait_for_distance(distance, status):
+            return node.wait_for(
+                lambda m: m.status == status
+                and abs(pt.link(m, "ball_link").distance - distance) < 1e-6,
+                "%g m" % distance,
+            )
+
+        try:
+            wait_for_distance(0.15, ProximityArray.OK)
+            begin = len(node.messages)
+            del world.poses["carriage"]
+            left = wait_for_distance(0.3, ProximityArray.OK)
+            told = next(source for source in left.sources if source.name == "cell")
+            self.assertEqual(told.status, ProximityArray.NO_CLOUD)
+            node.wait_until(
+                lambda: "some of it is left out" in node.diagnostics["input cell"].message,
+                "what is left out",
+            )
+            for message in node.messages[begin:]:
+                self.assertLessEqual(pt.link(message, "ball_link").lower_bound, 0.3)
+            world.poses["carriage"] = ("base", pt.transform((0, 0.35, 0)))
+            wait_for_distance(0.15, ProximityArray.OK)
+        finally:
+            node.stop()
+            world.stop()
+
     def test_joint_states(self):
         publishers = {}
 

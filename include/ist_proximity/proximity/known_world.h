@@ -52,13 +52,15 @@ class KnownWorld {
   const std::vector<Object>& objects() const { return objects_; }
   /// Names of the frames that objects stand in, each once.
   const std::vector<std::string>& frames() const { return frames_; }
-  std::size_t triangles() const { return triangles_; }  ///< of all objects
+
+  /// The world of the objects in some of the frames, where others are not known. It has all frames.
+  /// @param frames  by frame, whether its objects stay
+  std::shared_ptr<const KnownWorld> in_frames(const std::vector<bool>& frames) const;
 
  private:
   friend class WorldBuilder;
   std::vector<Object> objects_;
   std::vector<std::string> frames_;
-  std::size_t triangles_ = 0;
 };
 
 /// A known world and where its frames are at one instant.

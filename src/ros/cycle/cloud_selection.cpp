@@ -37,6 +37,8 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       report.counts = snapshot->cloud.counts;
       report.snapshot_memory = snapshot->cloud.index.memory();
       report.ingest_time = snapshot->cloud.ingest_time;
+      if (!snapshot->unplaced.empty() && !report.incomplete.empty()) report.incomplete += "; ";
+      report.incomplete += snapshot->unplaced;
     }
     const std::size_t parent = parent_of(sources, i);
     report.status = parent == i ? source_status(report, now.toSec())

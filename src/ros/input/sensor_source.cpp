@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <utility>
 
 #include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
@@ -120,7 +122,8 @@ void SensorSource::receive(Measurement measurement) {
   has_received_ = true;
   take_target();
   const ros::Time stamp = measurement.header.stamp;
-  const std::string problem = check(measurement);
+  std::string problem = check(measurement);
+  if (problem.empty() && !is_map_) problem = note_frame(measurement.header.frame_id);
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
   if (is_believed && ahead >= kToldSkew) {
@@ -194,6 +197,26 @@ std::string SensorSource::check(const Measurement& measurement) const {
   }
   if (!measurement.fault.empty()) return measurement.fault;
   return target_.model || is_map_ ? "" : "it waits for the robot's model";
+}
+
+/// Each cloud takes the place of the one before, so that of two sensors only one would be seen at a
+/// time. A sensor that gets another frame keeps it for longer than the timeout.
+/// @returns empty, or why the messages of now cannot be used
+std::string SensorSource::note_frame(const std::string& frame) {
+  const ros::Time now = ros::Time::now();
+  if (frame != frame_) {
+    if (frame == frame_before_ && std::abs(seconds_between(frame_since_, now)) < config_.timeout) {
+      frames_alternate_until_ = now + ros::Duration(config_.timeout);
+    }
+    frame_before_ = std::exchange(frame_, frame);
+    frame_since_ = now;
+  }
+  // The clock may have gone back.
+  const double left = seconds_between(now, frames_alternate_until_);
+  if (!(left > 0.0 && left <= config_.timeout)) return "";
+  return "its " + noun_ + "s come by turns in the frames '" + std::min(frame_, frame_before_) +
+         "' and '" + std::max(frame_, frame_before_) +
+         "', so that one would hide the other: give each sensor a topic and a source of its own";
 }
 
 /// [s] How much earlier a stamp is than the newest one that is in use or waits; negative: it is

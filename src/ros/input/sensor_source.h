@@ -55,6 +55,7 @@ class SensorSource : public Source {
   void take_target();
   void receive(Measurement measurement);
   std::string check(const Measurement& measurement) const;
+  std::string note_frame(const std::string& frame);
   double went_back(const ros::Time& stamp) const;
   void start_again(const ros::Time& stamp);
   void place_newest();
@@ -83,9 +84,12 @@ class SensorSource : public Source {
   Ingest ingest_, zone_ingest_;  ///< the latter of what is in zones
   MeasurementQueue waiting_;
   std::shared_ptr<const Measurement> last_map_;
-  bool map_is_new_ = false;    ///< last_map_ is not in use with this model yet
-  ros::Time in_use_;           ///< stamp of the newest snapshot of this generation
-  std::uint64_t content_ = 0;  ///< Measurement::content of the newest message
+  bool map_is_new_ = false;           ///< last_map_ is not in use with this model yet
+  ros::Time in_use_;                  ///< stamp of the newest snapshot of this generation
+  std::uint64_t content_ = 0;         ///< Measurement::content of the newest message
+  std::string frame_, frame_before_;  ///< of the newest message, and another one before it
+  ros::Time frame_since_;             ///< when frame_ took the other's place
+  ros::Time frames_alternate_until_;
   std::chrono::steady_clock::time_point target_since_;  ///< with this model and generation
   std::chrono::steady_clock::time_point waits_since_;   ///< nothing waited, or one was ingested
   bool waits_for_tf_ = false;                           ///< the reported problem is that wait

@@ -42,6 +42,8 @@ struct SourceSnapshot {
   /// belong to the world then.
   PosedWorld world;
   std::shared_ptr<const RobotSurfaces> surfaces;
+  std::vector<bool> is_placed;  ///< by frame of the world; its objects are left out where not
+  std::string unplaced;         ///< why some of the world is left out; empty: none is
 };
 
 /// Appends the clouds of a snapshot that hold obstacles.

@@ -166,32 +166,47 @@ std::shared_ptr<const SourceSnapshot> Source::share(const SnapshotRequest& reque
 }
 
 /// Looks up where the frames of objects and of a map are at an instant, or else at the newest one
-/// that tf knows. A cloud is placed already, and only asked whether that still holds.
+/// that tf knows. A cloud is placed already, and only asked whether that still holds. Of a world,
+/// what can be placed is left.
 /// @param placed  receives it where the source is placed when asked
 /// @returns empty, or why the snapshot cannot be used
 std::string Source::place(const SnapshotRequest& request, const SourceSnapshot& original,
                           SourceSnapshot* placed) const {
-  std::string ended = ended_zone(original, ros::Time::now());
-  if (!ended.empty()) return ended;
+  std::string problem = ended_zone(original, ros::Time::now());
+  if (!problem.empty()) return problem;
   if (!is_placed_when_asked_) return buffer_.dispute(original.fixed_frame, original.map_frame);
   std::vector<Eigen::Isometry3d>& X_FB = placed->world.X_FB;
   placed->lags.resize(X_FB.size() + (original.cloud.boxes ? 1 : 0));
+  placed->is_placed.resize(X_FB.size(), true);
   const auto place_frame = [&](const std::string& frame, Lag* lag, Eigen::Isometry3d* X) {
     X->setIdentity();
-    if (frame == kFixedFrame) return std::string();
-    return look_up_near(buffer_, original.fixed_frame, frame, request.time, request.max_age, X,
-                        lag);
+    if (frame == kFixedFrame) return true;
+    const std::string found =
+        look_up_near(buffer_, original.fixed_frame, frame, request.time, request.max_age, X, lag);
+    if (problem.empty()) problem = found;
+    return found.empty();
   };
+  bool has_changed = false;
   for (std::size_t i = 0; i < X_FB.size(); ++i) {
-    const std::string problem =
+    const bool is_placed =
         place_frame(original.world.world->frames()[i], &placed->lags[i], &X_FB[i]);
-    if (!problem.empty()) return problem;
+    has_changed = has_changed || placed->is_placed[i] != is_placed;
+    placed->is_placed[i] = is_placed;
   }
-  if (!original.cloud.boxes) return "";
-  Eigen::Isometry3d X_FM;
-  const std::string problem = place_frame(original.map_frame, &placed->lags.back(), &X_FM);
-  if (problem.empty()) placed->cloud.X_FM = X_FM * original.X_BM;
-  return problem;
+  if (has_changed) {
+    placed->world.world =
+        problem.empty() ? original.world.world : original.world.world->in_frames(placed->is_placed);
+  }
+  if (original.cloud.boxes) {
+    Eigen::Isometry3d X_FM;
+    const bool is_placed = place_frame(original.map_frame, &placed->lags.back(), &X_FM);
+    placed->cloud.boxes = is_placed ? original.cloud.boxes : nullptr;
+    placed->cloud.X_FM = X_FM * original.X_BM;
+  }
+  const bool has_rest =
+      placed->cloud.boxes || (placed->surfaces && !placed->world.world->objects().empty());
+  placed->unplaced = has_rest && !problem.empty() ? "some of it is left out: " + problem : "";
+  return has_rest ? "" : problem;
 }
 
 /// The first doubt about where the frames of a snapshot are; empty: none.
