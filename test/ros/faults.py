@@ -16,7 +16,6 @@ import json
 import os
 import re
 import sys
-import threading
 import time
 import unittest
 
@@ -26,6 +25,7 @@ import proximity_testing as pt
 import rospy
 from ist_proximity.msg import SpeedScaleState
 from proximity_testing import LinkProximity, ProximityArray
+from stall_meter import StallMeter
 
 STATUS = {
     getattr(ProximityArray, name): name
@@ -38,33 +38,6 @@ PERIOD = 1.0 / RATE
 TRANSPORT = 0.2  # [s] from publish() here to the node, and back, on a loaded machine
 LONGEST_GAP = 3.0  # [s] between two messages: a node that is silent for longer hangs
 FAR_BOX = pt.transform((0, 0.8, 0))
-
-
-class StallMeter:
-    """How late a thread of this process wakes: what the machine adds to every time measured here."""
-
-    STEP = 0.005
-
-    def __init__(self):
-        self._stalls = []  # (time at which it woke, how late)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def _run(self):
-        before = time.monotonic()
-        while not self._stop.wait(self.STEP):
-            now = time.monotonic()
-            self._stalls.append((now, now - before - self.STEP))
-            before = now
-
-    def worst(self, begin, end):
-        """[s] The latest that it woke between two times of time.monotonic()."""
-        return max([late for t, late in list(self._stalls) if begin <= t <= end + 0.1] + [0.0])
-
-    def stop(self):
-        self._stop.set()
-        self._thread.join()
 
 
 class TimedNode(pt.ProximityNode):

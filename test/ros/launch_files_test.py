@@ -75,8 +75,14 @@ class Robot:
             self.clouds[topic].publish(pt.cloud(points, "base"))
 
     def wait_until_ok(self):
-        pt.wait_until(lambda: self.answer and self.answer.status == ProximityArray.OK, "OK")
-        return self.answer
+        answers = []
+
+        def is_ok():
+            answers.append(self.answer)
+            return self.answer and answers[-1].status == ProximityArray.OK
+
+        pt.wait_until(is_ok, "OK")
+        return answers[-1]
 
     def stop(self):
         for repeater in self.repeaters:

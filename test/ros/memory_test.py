@@ -62,6 +62,16 @@ class MemoryTest(unittest.TestCase):
     def ball(self, message):
         return pt.link(message, "ball_link")
 
+    def remember(self, count):
+        """Waits until the memory has taken as many more clouds."""
+        stamps = set()
+
+        def has_taken(message):
+            stamps.update(source.stamp for source in message.sources[1:])
+            return len(stamps) > count
+
+        self.node.wait_for(has_taken, "%d clouds in the memory" % count)
+
     def is_from(self, source):
         return lambda m: m.status == ProximityArray.OK and self.ball(m).source == source
 
@@ -78,7 +88,6 @@ class MemoryTest(unittest.TestCase):
         ball = self.ball(seen)  # ~unknown_space is free
         self.assertTrue(np.isnan([ball.seen_share, ball.seen_age, ball.unseen_distance]).all())
 
-        hidden_since = rospy.Time.now().to_sec()
         self.world.points = NEAR
         first = len(self.node.messages)
         hidden = self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered")
@@ -92,17 +101,18 @@ class MemoryTest(unittest.TestCase):
         self.assertGreater(memory_status.stamp, rospy.Time(0))
 
         forgotten = self.node.wait_for(self.is_clear, "the far patch forgotten")
-        took = forgotten.header.stamp.to_sec() - hidden_since
+        seen_last = max(stamp for stamp, points in self.world.clouds_sent if points is FAR)
+        took = (forgotten.sources[1].stamp - seen_last).to_sec()
         self.assertGreater(took, DECAY - 0.5)
         self.assertLess(took, DECAY + 1.0)
 
         # What the camera sees through is answered by the cloud at once, and cleared soon.
         self.world.points = FAR
         self.node.wait_for(self.is_from("cloud"), "the far patch again")
-        rospy.sleep(1.0)  # until it is as occupied as can be
+        self.remember(20)  # until it is as occupied as can be
         self.world.points = BEHIND
         self.node.wait_for(self.is_clear, "nothing near where the camera sees through")
-        rospy.sleep(1.5)  # 0.5 s at 20 clouds a second, and what a busy machine is late
+        self.remember(15)
         first = len(self.node.messages)
         self.world.points = NEAR
         self.node.wait_for(lambda m: len(self.node.messages) > first + 50, "50 answers")
@@ -173,9 +183,10 @@ class MemoryTest(unittest.TestCase):
             self_filter_links="all",
         )
         self.node.wait_for(self.is_from("cloud"), "the far patch in view")
-        rospy.sleep(0.5)
+        self.remember(10)
         del self.world.poses["box_link"]
-        rospy.sleep(0.2)
+        count = len(self.world.clouds_sent)
+        pt.wait_until(lambda: len(self.world.clouds_sent) > count + 4, "clouds without the pose")
         self.world.points = NEAR
         self.node.wait_until(
             lambda: "'box_link' was not known"

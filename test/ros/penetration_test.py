@@ -107,7 +107,8 @@ class PenetrationTest(unittest.TestCase):
     def test_volumes_and_finer_spheres_come_on_first_need(self):
         """Nothing is near: coarse spheres and no volume. Then the box comes near, not in contact."""
         self.world.poses["box_link"] = ("base", box_at(-1.5))
-        node = self.start()
+        # A machine that stops for a while makes nothing stale.
+        node = self.start(cloud_timeout=8.0, pose_timeout=8.0)
         node.wait_for_status(ProximityArray.OK)
         node.wait_until(
             lambda: node.diagnostic("model", "links with a volume").startswith("0 of 2"),

@@ -157,6 +157,8 @@ class World:
         self.namespace = namespace
         self.poses = {}  # child frame: (parent, X or a function of the time in seconds)
         self.points = np.zeros((0, 3))  # in the camera's frame
+        self.clouds_sent = []  # (stamp, points)
+        self.tf_sent = []  # stamps
         self._tf = rospy.Publisher(namespace + "/tf", TFMessage, queue_size=100)
         self._tf_static = rospy.Publisher(
             namespace + "/tf_static", TFMessage, queue_size=10, latch=True
@@ -182,13 +184,17 @@ class World:
             for child, (parent, X) in dict(self.poses).items()
         ]
         if messages:
+            self.tf_sent.append(stamp)
             self._tf.publish(messages)
 
     def publish_transforms(self, messages):
         self._tf.publish(messages)
 
     def send_cloud(self):
-        self.cloud_publisher.publish(cloud(self.points))
+        points = self.points
+        message = cloud(points)
+        self.clouds_sent.append((message.header.stamp, points))
+        self.cloud_publisher.publish(message)
 
     def start_tf(self, rate=50):
         return self.repeat(rate, self.send_tf)
@@ -338,6 +344,12 @@ class ProximityNode:
                         % (what, len(self.messages), last, self.log())
                     )
                 self._condition.wait(0.1)
+
+    def next_messages(self, count):
+        """Returns as many messages, from now on."""
+        begin = len(self.messages)
+        self.wait_for(lambda m: len(self.messages) >= begin + count, "%d messages" % count)
+        return self.messages[begin:]
 
     def wait_for_status(self, status, text="", **kwargs):
         return self.wait_for(
