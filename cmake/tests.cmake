@@ -51,6 +51,17 @@ else()
   message(STATUS "ist_proximity: no pcl_test, PCL is missing (apt install libpcl-dev)")
 endif()
 
+# ist_proximity_cost(TEST [NAME SECONDS]...): those that take long start first, so that none is left
+# running alone at the end. `ctest` knows by itself only after a first run.
+function(ist_proximity_cost test)
+  while(ARGN)
+    list(POP_FRONT ARGN name seconds)
+    if(test MATCHES "(^|_)${name}(_test|\\.test)?$")
+      set_tests_properties(${test} PROPERTIES COST ${seconds})
+    endif()
+  endwhile()
+endfunction()
+
 # ist_proximity_gtest(TARGET [ARGUMENT...]): makes a GoogleTest program a core test.
 function(ist_proximity_gtest test)
   set_target_properties(${test} PROPERTIES
@@ -68,6 +79,8 @@ function(ist_proximity_gtest test)
     set(ctest_name ${test})
   endif()
   set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT 600)
+  ist_proximity_cost(${ctest_name}
+    packer 30 accuracy_doc 25 closed_loop 20 contact_known 16 link_pair_exact 13 contact_of_links 12)
 endfunction()
 
 # Read once for all tests: half of the compiler's work.
@@ -155,14 +168,21 @@ if(rostest_FOUND)
     add_rostest(${file} DEPENDENCIES
       proximity_node velocity_filter_node ist_proximity_nodelet simulator_node dodge_node)
     string(REPLACE "/" "_" test ${file})
-    # A robot that is steered, or a clock, in real time runs alone. The others wait for what the node
-    # says, and judge it by stamps and counts.
+    # They wait for what the node says, and judge it by stamps and counts. Of those in which robots are
+    # steered or steer in real time one takes the place of two, and the others run alone.
+    set(places 1)
     set(serial OFF)
-    if(test MATCHES "^test_ros_(clock|demo|dodge|pairs|velocity_filter)\\.test$")
+    if(test STREQUAL "test_ros_velocity_filter.test")
+      set(places 2)
+    elseif(test MATCHES "^test_ros_(demo|dodge|pairs)\\.test$")
       set(serial ON)
     endif()
-    set_tests_properties(_ctest_${PROJECT_NAME}_rostest_${test} PROPERTIES
-      LABELS ros TIMEOUT 600 RUN_SERIAL ${serial})
+    set(name _ctest_${PROJECT_NAME}_rostest_${test})
+    set_tests_properties(${name} PROPERTIES
+      LABELS ros TIMEOUT 600 PROCESSORS ${places} RUN_SERIAL ${serial})
+    ist_proximity_cost(${name}
+      query 70 parameters 65 velocity_filter 60 contract 50 names 50 laser_scan 50 bad_input 45
+      world 45 diagnostics 45 joint_states 35 memory 35)
   endforeach()
 endif()
 
