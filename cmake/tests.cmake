@@ -168,18 +168,14 @@ if(rostest_FOUND)
     add_rostest(${file} DEPENDENCIES
       proximity_node velocity_filter_node ist_proximity_nodelet simulator_node dodge_node)
     string(REPLACE "/" "_" test ${file})
-    # They wait for what the node says, and judge it by stamps and counts. Of those in which robots are
-    # steered or steer in real time one takes the place of two, and the others run alone.
-    set(places 1)
+    # They wait for what the node says, and judge it by stamps and counts. Demos, in which robots move
+    # in real time, and pairs of options, of which every message counts, run alone.
     set(serial OFF)
-    if(test STREQUAL "test_ros_velocity_filter.test")
-      set(places 2)
-    elseif(test MATCHES "^test_ros_(demo|dodge|pairs)\\.test$")
+    if(test MATCHES "^test_ros_(demo|dodge|pairs)\\.test$")
       set(serial ON)
     endif()
     set(name _ctest_${PROJECT_NAME}_rostest_${test})
-    set_tests_properties(${name} PROPERTIES
-      LABELS ros TIMEOUT 600 PROCESSORS ${places} RUN_SERIAL ${serial})
+    set_tests_properties(${name} PROPERTIES LABELS ros TIMEOUT 600 RUN_SERIAL ${serial})
     ist_proximity_cost(${name}
       query 70 parameters 65 velocity_filter 60 contract 50 names 50 laser_scan 50 bad_input 45
       world 45 diagnostics 45 joint_states 35 memory 35)
