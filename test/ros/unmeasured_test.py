@@ -134,6 +134,8 @@ class Watched:
         self.world.start_tf(20)
         source = {"topic": "/" + kind, "type": TYPES[kind]._type, **SETTINGS[setting]}
         parameters = {"sources": {"eye": source}, "rate": 20.0, "min_distance/fixed_links": True}
+        if setting != "frozen":  # a machine that stops for a while makes nothing stale
+            parameters.update(cloud_timeout=8.0, pose_timeout=8.0)
         if setting == "unknown":
             parameters["unknown_space"] = "obstacle"
         self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
