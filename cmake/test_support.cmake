@@ -1,7 +1,7 @@
 # Helpers of tests, fuzz targets and benchmarks, test/support/*.cpp: compiled once, and optimized as
 # the core is. Those that expect something with GoogleTest are for tests only (cmake/tests.cmake).
 
-file(GLOB test_helper_sources CONFIGURE_DEPENDS test/support/*.cpp)
+file(GLOB test_helper_sources CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} test/support/*.cpp)
 set(gtest_helper_sources "")
 foreach(source IN LISTS test_helper_sources)
   file(STRINGS ${source} gtest REGEX "<gtest/gtest.h>" LIMIT_COUNT 1)
@@ -11,7 +11,8 @@ foreach(source IN LISTS test_helper_sources)
 endforeach()
 list(REMOVE_ITEM test_helper_sources ${gtest_helper_sources})
 
-add_library(test_helpers STATIC EXCLUDE_FROM_ALL ${test_helper_sources})
+ist_proximity_units(test_helper_units ${test_helper_sources})
+add_library(test_helpers STATIC EXCLUDE_FROM_ALL ${test_helper_units})
 set_target_properties(test_helpers PROPERTIES
   ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
 target_include_directories(test_helpers PUBLIC

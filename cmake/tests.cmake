@@ -149,6 +149,9 @@ if(catkin_FOUND AND TARGET ist_proximity_ros)
     target_include_directories(${test} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
     target_link_libraries(${test} PRIVATE
       test_helpers ist_proximity_ros GTest::GTest GTest::Main)
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT IST_PROXIMITY_SANITIZE)
+      target_compile_options(${test} PRIVATE -O1)  # as the core's
+    endif()
     set_target_properties(${test} PROPERTIES
       RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
     add_dependencies(tests ${test})
