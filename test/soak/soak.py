@@ -244,8 +244,7 @@ def set_parameters(folder, arguments):
         "pose_source": "joint_states", "cache_directory": os.path.join(folder, "cache"),
         "max_distance": MAX_DISTANCE, "self_filter": False, "min_range": 0.0, "max_range": 20.0,
         "query": {"margin": MARGIN, "tolerance": TOLERANCE},
-        "self_collision": {"enabled": True, "rate": 20.0},
-        "penetration": {"max_spheres": 100},
+        "self_collision": {"enabled": True},
     })
 
 
