@@ -110,14 +110,18 @@ class FaultsSensorTest(faults.FaultTest):
 
     def test_two_sensors_on_one_topic(self):
         """Each cloud would hide what the other sensor sees."""
-        self.world.poses["other_camera"] = ("base", pt.transform((0.2, -0.3, 0.1)))
+        X = pt.transform((0.2, -0.3, 0.1))
+        self.world.poses["other_camera"] = ("base", X)
         node = self.start()
         count = [0]
 
         def by_turns(message):
             count[0] += 1
             if count[0] % 2 == 0:
-                message.header.frame_id = "other_camera"
+                return message
+            z = np.frombuffer(message.data, "<f4")[2]
+            moved = pt.apply(pt.inverse(X), [[0, 0, z]])
+            return pt.cloud(moved, "other_camera", message.header.stamp)
 
         self.sensor.change = by_turns
         node.wait_for_status(ProximityArray.STALE_CLOUD, "by turns in the frames")

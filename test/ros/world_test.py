@@ -339,7 +339,8 @@ class OtherRobotTest(unittest.TestCase):
             told = next(source for source in left.sources if source.name == "cell")
             self.assertEqual(told.status, ProximityArray.NO_CLOUD)
             node.wait_until(
-                lambda: "some of it is left out" in node.diagnostics["input cell"].message,
+                lambda: "input cell" in node.diagnostics
+                and "some of it is left out" in node.diagnostics["input cell"].message,
                 "what is left out",
             )
             for message in node.messages[begin:]:
