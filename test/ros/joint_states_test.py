@@ -331,6 +331,34 @@ class JointStatesTest(unittest.TestCase):
             speeds.append(pt.link(message, "ball_link").closing_speed)
         self.assertGreater(np.isfinite(speeds).mean(), 0.8)
 
+    def test_joints_by_turns(self):
+        """A joint that came before the other may have moved since: bounds hold at the stamp."""
+        obstacle = np.array([[0.9, 0.6, 0.6]])  # in base
+        node = self.start(max_distance=3.0, min_range=0.0, self_filter=False)
+        turns = []
+
+        def send_one():
+            turns.append(self.send("slide" if len(turns) % 2 else "turn"))
+
+        self.world.repeat(60, send_one)
+        self.world.repeat(
+            20, lambda: self.world.cloud_publisher.publish(pt.cloud(obstacle, "base", rospy.Time.now()))
+        )
+        node.wait_for_status(ProximityArray.OK)
+        beyond, below = [], []
+        for message in node.next_messages(200):
+            X = arm_poses(**motion(message.header.stamp.to_sec()))
+            for one in message.links:
+                if one.state == LinkProximity.UNKNOWN:
+                    continue
+                truth = pt.DISTANCE[one.link](pt.apply(pt.inverse(X[one.link]), obstacle)).min()
+                self.assertLessEqual(one.lower_bound, truth + 5e-4)
+                beyond.append(one.distance - truth)
+                below.append(truth - one.lower_bound)
+        self.assertGreater(len(beyond), 300)
+        self.assertGreater(max(beyond), 0.002)  # the joint that is late matters
+        self.assertLess(np.median(below), 0.05)
+
     def test_burst(self):
         """Joint states that come all at once are answered one by one, in their order."""
         node = self.start(pose_timeout=5.0)

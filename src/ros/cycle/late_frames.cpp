@@ -15,6 +15,7 @@ double turn_of(const Eigen::Isometry3d& moved) { return Eigen::AngleAxisd(moved.
 
 void LateFrames::begin() {
   lags_.clear();
+  links_ = {};
   most_ = 0.0;
   latest_ = nullptr;
 }
@@ -37,12 +38,12 @@ double LateFrames::shift(std::size_t link, double bound, const Lag** lag) const 
       if (lag) *lag = one;
     }
   }
-  return most;
+  return most + (links_.empty() ? 0.0 : links_[link]);
 }
 
 double LateFrames::range(double max_distance) const {
   double farthest = max_distance, turn = 0.0;
-  if (lags_.empty()) return farthest;
+  if (lags_.empty() && links_.empty()) return farthest;
   for (const Lag* lag : lags_) {
     for (const Eigen::Isometry3d& moved : lag->moves()) {
       turn = std::max(turn, lag->age / lag->window * turn_of(moved));
@@ -58,7 +59,7 @@ double LateFrames::range(double max_distance) const {
 }
 
 void LateFrames::lower(double max_distance, std::vector<LinkProximity>* answers) {
-  if (lags_.empty()) return;
+  if (lags_.empty() && links_.empty()) return;
   for (std::size_t i = 0; i < answers->size(); ++i) {
     LinkProximity& answer = (*answers)[i];
     if (answer.state == LinkState::kUnknown) continue;
@@ -72,7 +73,7 @@ void LateFrames::lower(double max_distance, std::vector<LinkProximity>* answers)
     } else {
       answer.sensor_width += off;
     }
-    if (off <= most_) continue;
+    if (lag == nullptr || off <= most_) continue;
     most_ = off;
     latest_ = lag;
   }

@@ -4,14 +4,16 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/geometry/span.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
 
-/// Obstacles in frames whose newest poses are older than the links'. They may have moved since: as
-/// far as they move in that time, which is taken off the bounds. One thread.
+/// Obstacles in frames whose newest poses are older than the links', and links that joints move
+/// whose newest positions are. They may have moved since: as far as they move in that time, which
+/// is taken off the bounds. One thread.
 class LateFrames {
  public:
   /// All of these outlive this.
@@ -26,6 +28,11 @@ class LateFrames {
 
   /// @param lag  outlives the cycle; one that is not late, or does not move, changes nothing
   void add(const Lag& lag);
+
+  /// @param moved  [m] by link: how far its points may have moved; empty: they have not. It
+  /// outlives
+  ///               the cycle
+  void set_links(Span<const double> moved) { links_ = moved; }
 
   /// [m] The range in which obstacles may have come nearer than `max_distance` since.
   double range(double max_distance) const;
@@ -45,6 +52,7 @@ class LateFrames {
   const std::vector<Eigen::Isometry3d>& X_FL_;
   const std::vector<bool>& known_;
   std::vector<const Lag*> lags_;
+  Span<const double> links_;
   double most_ = 0.0;            ///< [m] that lower() took off
   const Lag* latest_ = nullptr;  ///< the reason for that
 };

@@ -53,6 +53,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       joint_repulsion_(*model_),
       wanted_(wanted_links(*model_)),
       measurable_(wanted_),
+      late_joints_(model_->kinematics, boxes_),
       late_worlds_(robot_, poses_.X_FL, known_),
       late_maps_(robot_, poses_.X_FL, known_),
       results_(robot_.links.size()),
@@ -207,6 +208,10 @@ void ProximityCycle::note_late_frames() {
       (i < objects ? late_worlds_ : late_maps_).add(lag);
     }
   }
+  const Span<const double> moved =
+      late_joints_.update(pose_source_.get(), poses_.stamp, poses_.known);
+  late_worlds_.set_links(moved);
+  late_maps_.set_links(moved);
 }
 
 /// In a configuration that the robot is not in, the objects that it carries are elsewhere, too.

@@ -17,6 +17,7 @@
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/cycle/late_frames.h"
+#include "ros/cycle/late_joints.h"
 #include "ros/cycle/robot_future.h"
 #include "ros/cycle/scene_warm_up.h"
 #include "ros/cycle/unknown_space_query.h"
@@ -158,6 +159,7 @@ class ProximityCycle {
   Status status_{0, ""};
   std::vector<bool> measurable_, known_;  ///< by link of the robot
   StampedLinkPoses poses_;
+  LateJoints late_joints_;
   LateFrames late_worlds_, late_maps_;
   StatusInput status_input_;
   Findings model_findings_, findings_;        ///< the former for all cycles

@@ -145,6 +145,40 @@ bool JointPoseSource::must_hold(const ros::Time& instant) const {
   return false;
 }
 
+/// A joint that comes less often than others keeps its position until its next sample: it moves on
+/// as fast as it did of late, or as it says.
+void JointPoseSource::find_lags(const ros::Time& instant) {
+  const auto& joints = kinematics_->joints();
+  lags_.assign(joints.size(), {0.0, 0.0, 0.0});
+  bool is_any_late = false;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (!has_own(j) || std::isnan(q_[j])) continue;
+    const JointPosition& position = positions_[j];
+    const double lag = seconds_between(position.stamp, instant);
+    if (!(lag > 0.0)) continue;
+    double speed = std::fmax(position.speed, position.speed_before);
+    speed = std::fmax(speed, std::abs(position.velocity));
+    // What is faster than the joint's limit is a jump of what is stated.
+    speed = std::fmin(speed, joints[j].speed);
+    // A URDF without a limit, and a single sample: nothing is known of its motion.
+    if (std::isinf(speed)) {
+      q_[j] = std::nan("");
+      joint_problems_[j] = {
+          "of joint '" + joints[j].name + "' a single position has come, " +
+              format_text("%.3f s ago, and the URDF has no limit of its velocity", lag),
+          true};
+      continue;
+    }
+    lags_[j].distance = speed * lag;
+    is_any_late = is_any_late || lags_[j].distance > 0.0;
+  }
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (joints[j].source == j || has_own(j)) continue;
+    lags_[j].distance = std::abs(joints[j].multiplier) * lags_[joints[j].source].distance;
+  }
+  if (!is_any_late) lags_.clear();
+}
+
 void JointPoseSource::describe_doubts(StampedLinkPoses* poses) const {
   const auto& joints = kinematics_->joints();
   const auto& bodies = kinematics_->bodies();
@@ -202,6 +236,7 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
     return poses->set_problem(wanted_, {"the joint states are from before the last answer", true});
   }
   if (instant.isZero()) instant = poses->stamp;
+  find_lags(instant);
 
   kinematics_->place_joints(q_, &joints_);
   const auto& joints = kinematics_->joints();
@@ -236,6 +271,7 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
 /// Takes all poses from tf, at the newest instant that it knows.
 void JointPoseSource::look_up_behind(const ros::Time& now, StampedLinkPoses* poses) {
   velocities_.clear();  // those are of a later instant
+  lags_.clear();        // tf knows all joints at its instant
   tf_source_.look_up(now, poses);
   for (std::size_t i = 0; i < moved_by_.size(); ++i) {
     for (const std::size_t j : moved_by_[i]) {

@@ -38,6 +38,7 @@ class JointPoseSource : public KinematicPoseSource {
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
                    BodyPoses* bodies) override;
   Span<const double> joint_velocities() const override { return velocities_; }
+  Span<const StoppingReach> joint_lags() const override { return lags_; }
   std::string hint() const override;
 
  private:
@@ -46,6 +47,7 @@ class JointPoseSource : public KinematicPoseSource {
   PoseProblem problem_of(std::size_t joint, const ros::Time& now) const;
   std::string is_late(std::size_t joint, std::size_t newest) const;
   bool must_hold(const ros::Time& instant) const;
+  void find_lags(const ros::Time& instant);
   void describe_doubts(StampedLinkPoses* poses) const;
   void look_up_behind(const ros::Time& now, StampedLinkPoses* poses);
   bool look_up_in_tf(const std::string& parent, const std::string& child, const ros::Time& now,
@@ -62,6 +64,7 @@ class JointPoseSource : public KinematicPoseSource {
   std::vector<double> q_;                    ///< by joint; NaN where it is not known
   std::vector<double> velocities_;           ///< likewise, or empty
   std::vector<PoseProblem> joint_problems_;  ///< by joint
+  std::vector<StoppingReach> lags_;          ///< by joint, or empty; kept while poses are held
   bool tf_is_behind_ = false;
   StampedLinkPoses last_;  ///< the result of the last look_up()
 };

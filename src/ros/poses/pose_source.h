@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ist_proximity/geometry/span.h"
+#include "ist_proximity/proximity/stopping_reach.h"
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/link_poses.h"
 
@@ -73,6 +74,10 @@ class PoseSource {
   /// How fast the joints moved at the instant of the last look_up() [rad/s, m/s], by joint of the
   /// kinematics: NaN where that is not known. Empty: of none it is.
   virtual Span<const double> joint_velocities() const { return {}; }
+
+  /// How far the joints may have moved from the positions of the last look_up() until its instant,
+  /// where those are older, by joint of the kinematics. Empty: none is.
+  virtual Span<const StoppingReach> joint_lags() const { return {}; }
 
   /// Whether the poses are of a configuration that the robot need not be in.
   virtual bool is_stated() const { return false; }

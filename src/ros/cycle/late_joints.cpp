@@ -1,0 +1,32 @@
+#include "ros/cycle/late_joints.h"
+
+#include <utility>
+
+#include "ist_proximity/proximity/stopping_reach.h"
+
+namespace ist {
+
+LateJoints::LateJoints(std::shared_ptr<const Kinematics> kinematics,
+                       const std::vector<LinkBox>& boxes)
+    : kinematics_(std::move(kinematics)), boxes_(boxes) {
+  if (!kinematics_) return;
+  for (const LinkBox& box : boxes_) {
+    links_.push_back(kinematics_->find_body(box.link).value_or(0));
+  }
+}
+
+Span<const double> LateJoints::update(PoseSource* source, const ros::Time& instant,
+                                      const std::vector<bool>& known) {
+  if (!kinematics_ || source == nullptr || source->joint_lags().empty()) return {};
+  source->look_up_all(*kinematics_, instant, &bodies_);
+  moved_.assign(links_.size(), 0.0);
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    if (i >= known.size() || !known[i]) continue;
+    moved_[i] =
+        stopping_reach(*kinematics_, source->joint_lags(), links_[i], boxes_[i].box_L, bodies_.X_FB)
+            .distance;
+  }
+  return moved_;
+}
+
+}  // namespace ist
