@@ -29,9 +29,8 @@ class LateFrames {
   /// @param lag  outlives the cycle; one that is not late, or does not move, changes nothing
   void add(const Lag& lag);
 
-  /// @param moved  [m] by link: how far its points may have moved; empty: they have not. It
-  /// outlives
-  ///               the cycle
+  /// @param moved  [m] by link: how far its points may have moved; empty: none has. Outlives the
+  ///               cycle
   void set_links(Span<const double> moved) { links_ = moved; }
 
   /// [m] The range in which obstacles may have come nearer than `max_distance` since.

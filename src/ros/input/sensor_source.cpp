@@ -200,20 +200,21 @@ std::string SensorSource::check(const Measurement& measurement) const {
 }
 
 /// Each cloud takes the place of the one before, so that of two sensors only one would be seen at a
-/// time. A sensor that gets another frame keeps it for longer than the timeout.
+/// time. A sensor that gets another frame keeps it for longer than the timeout, or 10 s.
 /// @returns empty, or why the messages of now cannot be used
 std::string SensorSource::note_frame(const std::string& frame) {
   const ros::Time now = ros::Time::now();
+  const double longest = std::min(config_.timeout, 10.0);  // the timeout may be infinite
   if (frame != frame_) {
-    if (frame == frame_before_ && std::abs(seconds_between(frame_since_, now)) < config_.timeout) {
-      frames_alternate_until_ = now + ros::Duration(config_.timeout);
+    if (frame == frame_before_ && std::abs(seconds_between(frame_since_, now)) < longest) {
+      frames_alternate_until_ = now + ros::Duration(longest);
     }
     frame_before_ = std::exchange(frame_, frame);
     frame_since_ = now;
   }
   // The clock may have gone back.
   const double left = seconds_between(now, frames_alternate_until_);
-  if (!(left > 0.0 && left <= config_.timeout)) return "";
+  if (!(left > 0.0 && left <= longest)) return "";
   return "its " + noun_ + "s come by turns in the frames '" + std::min(frame_, frame_before_) +
          "' and '" + std::max(frame_, frame_before_) +
          "', so that one would hide the other: give each sensor a topic and a source of its own";
