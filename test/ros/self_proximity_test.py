@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
-from joint_states_test import ARM, JointStatesTest, joint_state
+from joint_states_test import ARM, JointStatesTest, joint_state, motion
 from proximity_testing import LinkProximity, ProximityArray
 
 from ist_proximity.msg import JointRepulsion, LinkPair
@@ -105,6 +105,42 @@ class SelfProximityTest(unittest.TestCase):
         self.joints.paused = True
         message = node.wait_for_status(ProximityArray.NO_POSE, "'turn'")
         self.assertTrue(pt.all_unknown(message))
+
+    def test_joint_that_is_late(self):
+        """What a joint between the links may have moved since its sample comes off the bounds; a
+        joint that carries both does not matter."""
+        node = self.start("late")
+        self.joints.stop()
+        publisher = JointStatesTest.joint_publisher(self.namespace)
+        for often, rare in (("turn", "slide"), ("slide", "turn")):
+            sent = []
+
+            def send():
+                stamp = rospy.Time.now()
+                q = motion(stamp.to_sec())
+                names = [often, rare] if len(sent) % 5 == 0 else [often]
+                publisher.publish(joint_state({name: q[name] for name in names}, stamp))
+                sent.append(stamp)
+
+            self.joints = pt.Repeater(60, send)
+            node.wait_until(lambda: len(sent) > 60, "a second of positions")
+            beyond, below = [], []
+            for message in node.next_messages(150):
+                one = pt.link(message, "ball_link")
+                if one.state == LinkProximity.UNKNOWN:
+                    continue
+                truth = 2.5 * motion(message.header.stamp.to_sec())["slide"] + 0.25
+                self.assertLessEqual(one.lower_bound, truth + 5e-4)
+                self.assertLessEqual(message.pairs[0].lower_bound, truth + 5e-4)
+                beyond.append(one.distance - truth)
+                below.append(truth - one.lower_bound)
+            self.joints.stop()
+            self.assertGreater(len(beyond), 120)
+            if rare == "slide":
+                self.assertGreater(max(beyond), 0.002)  # the joint that is late matters
+                self.assertLess(np.median(below), 0.05)
+            else:
+                self.assertLess(np.median(below), 0.007)
 
     def link_pairs(self, until=lambda answer: answer.success, **kwargs):
         """The answer of ~link_pairs, which comes a little after the model."""

@@ -29,11 +29,16 @@ class LateJoints {
   Span<const double> update(PoseSource* source, const ros::Time& instant,
                             const std::vector<bool>& known);
 
+  /// [m] How much nearer to each other two links of the robot may have come since: joints that move
+  /// both alike do not count. Of the last update().
+  double approach(std::size_t first, std::size_t second);
+
  private:
   const std::shared_ptr<const Kinematics> kinematics_;
   const std::vector<LinkBox>& boxes_;
   std::vector<std::size_t> links_;  ///< by link: its body; 0: no joint moves it
   BodyPoses bodies_;
+  std::vector<StoppingReach> lags_, own_;  ///< by joint; of approach(): of one link's alone
   std::vector<double> moved_;
 };
 

@@ -100,6 +100,7 @@ void SelfProximity::take_model() {
       make_pose_source(*model_, config_, buffer_, joints_, JointStateListener::Which::kNewest);
   speeds_.assign(model_->robot->links.size(), ClosingSpeed());
   boxes_ = link_boxes(*model_->robot);
+  late_joints_.emplace(model_->kinematics, boxes_);
 }
 
 std::vector<LinkPair> SelfProximity::watched_pairs() const {
@@ -185,6 +186,27 @@ Wrench SelfProximity::penetration(std::size_t link, const LinkProximity& answer)
   return all;
 }
 
+/// What joints that are late may have moved comes off the bounds of the pairs that they part.
+void SelfProximity::measure(const LiveConfig& live) {
+  late_joints_->update(pose_source_.get(), poses_.stamp, poses_.known);
+  const std::vector<LinkPair>& pairs = query_->pairs();
+  approach_.clear();
+  for (const LinkPair& pair : pairs) {
+    approach_.push_back(late_joints_->approach(pair.first, pair.second));
+  }
+  QueryConfig query = live.query;
+  if (!pairs.empty()) query.max_distance += *std::max_element(approach_.begin(), approach_.end());
+  query_->set_config(query);
+  margin_ = query.margin;
+  query_->run(poses_.X_FL, poses_.known, &results_);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    PairProximity& result = results_[i];
+    result.lower_bound -= approach_[i];
+    if (result.state != LinkState::kClear) continue;
+    result.lower_bound = std::min(result.lower_bound, live.query.max_distance);
+  }
+}
+
 void SelfProximity::publish_once() {
   const ros::Time now = ros::Time::now();
   if (now < last_now_) {
@@ -207,9 +229,7 @@ void SelfProximity::publish_once() {
     poses_.stamp = last_stamp_;
     pose_source_->look_up(now, &poses_);
     const auto begin = Clock::now();
-    query_->set_config(live.query);
-    margin_ = live.query.margin;
-    query_->run(poses_.X_FL, poses_.known, &results_);
+    measure(live);
     for (const std::size_t i : model_->monitored)
       input.deadline.unfinished += is_finished(i) ? 0 : 1;
     message->unfinished = static_cast<std::uint32_t>(input.deadline.unfinished);

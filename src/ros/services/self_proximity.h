@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ros/common/stop_signal.h"
+#include "ros/cycle/late_joints.h"
 #include "ros/model/model_loader.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
@@ -52,6 +54,7 @@ class SelfProximity {
   void add_link(std::size_t link, const RepulsionConfig& repulsion,
                 ist_proximity::ProximityArray* message);
   bool is_finished(std::size_t link) const;
+  void measure(const LiveConfig& live);
   void compute_wrenches(const LiveConfig& live, TimePoint end, DeadlineCost* cost);
   Wrench penetration(std::size_t link, const LinkProximity& answer) const;
 
@@ -73,9 +76,11 @@ class SelfProximity {
   std::unique_ptr<PoseSource> pose_source_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
   std::vector<LinkBox> boxes_;        ///< likewise
+  std::optional<LateJoints> late_joints_;
   ros::Time last_now_, last_stamp_;
   StampedLinkPoses poses_;
   std::vector<PairProximity> results_;
+  std::vector<double> approach_;  ///< [m] by pair: what late joints may have taken off its distance
   double margin_ = 0.0;           ///< [m] in their lower bounds
   std::vector<Wrench> wrenches_;  ///< by pair: the wrench on its first link
   std::thread thread_;
