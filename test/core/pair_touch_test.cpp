@@ -173,6 +173,25 @@ TEST(PairTouch, TheBoundIsTheGapAtTouchAndTheDepthInside) {
   }
 }
 
+// Only the cover of a sphere reaches into a corner, and its middle may be outside the other link.
+TEST(PairTouch, ACornerIsAsDeepAsItIs) {
+  const Eigen::Matrix3d corner_up =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d(1.0, 1.0, 1.0), Eigen::Vector3d::UnitX())
+          .toRotationMatrix();
+  const double corner = 0.1 * std::sqrt(3.0);  // [m] its height
+  for (const double max_error : {0.02, 0.005}) {
+    Pair pair(test::box({0.2, 0.2, 0.2}), Box{{0.6, 0.6, 0.6}}, max_error);
+    pair.X_FL[0].linear() = corner_up;
+    for (double depth = 1e-4; depth < 0.05; depth *= 1.3) {
+      pair.X_FL[1].translation() = Eigen::Vector3d(0.3 + corner - depth, 0.0, 0.0);
+      const PairProximity answer = pair.run_fresh();
+      EXPECT_EQ(answer.state, LinkState::kContact) << depth;
+      EXPECT_LE(answer.lower_bound, -depth + 1e-12) << max_error;
+      EXPECT_GE(answer.distance, answer.lower_bound);
+    }
+  }
+}
+
 // The tip of a needle is inside a box without a lid, 50 mm from all of its walls: spheres of 20 mm
 // do not show it, and there is no place where surfaces touch.
 TEST(PairTouch, AContactThroughAnOpeningHasADepthAndPointsOnTheLinks) {
