@@ -38,8 +38,8 @@ double LateJoints::approach(std::size_t first, std::size_t second) {
     for (std::size_t at = links_[other]; at != 0; at = kinematics_->joints()[at - 1].parent) {
       own_[at - 1] = {0.0, 0.0, 0.0};
     }
-    moved += stopping_reach(*kinematics_, own_, links_[link], boxes_[link].box_L, bodies_.X_FB)
-                 .distance;
+    moved +=
+        stopping_reach(*kinematics_, own_, links_[link], boxes_[link].box_L, bodies_.X_FB).distance;
   }
   return moved;
 }

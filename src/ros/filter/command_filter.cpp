@@ -83,7 +83,9 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
         "proximity/self_proximity", 1, [this](const auto& answers) { take(answers, &self_); }, {},
         hints);
   }
-  answers_ = nh_.subscribe("proximity/proximity", 1, &CommandFilter::take_answers, this, hints);
+  answers_ = nh_.subscribe<ist_proximity::ProximityArray>(
+      "proximity/proximity", 1, [this](const auto& answers) { take(answers, &obstacles_); }, {},
+      hints);
   joints_ = nh_.subscribe("joint_states", 50, &CommandFilter::take_joints, this, hints);
   node_scale_ = nh_.subscribe("proximity/speed_scale", 1, &CommandFilter::take_scale, this, hints);
   subscribe<trajectory_msgs::JointTrajectory, std_msgs::Float64MultiArray, sensor_msgs::JointState,
@@ -243,13 +245,6 @@ void CommandFilter::take_scale(const std_msgs::Float64& scale) {
   newest_scale_came_ = ros::Time::now();
 }
 
-void CommandFilter::take_answers(const ist_proximity::ProximityArray::ConstPtr& answers) {
-  // While the node reads its model again its status is not what it was.
-  const bool has_changed = std::exchange(newest_status_, answers->status) != answers->status;
-  if (has_changed && kinematics_) read_robot();
-  take(answers, &obstacles_);
-}
-
 void CommandFilter::take(const ist_proximity::ProximityArray::ConstPtr& answers,
                          PlacedAnswers* placed) {
   clock_has_gone_back();
@@ -290,7 +285,7 @@ bool CommandFilter::clock_has_gone_back() {
 }
 
 void CommandFilter::on_timer() {
-  if (!kinematics_) read_robot();
+  read_robot();
   if (clock_has_gone_back()) return;
   const ros::Time now = ros::Time::now();
   const double age = seconds_between(last_command_, now);

@@ -9,7 +9,6 @@
 #include <visualization_msgs/MarkerArray.h>
 #include <xmlrpcpp/XmlRpc.h>
 
-#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -71,7 +70,6 @@ class CommandFilter {
   /// Gives 0 for all joints that have been commanded.
   void halt(const std::string& reason);
   void halt_late(const ros::Time& now);
-  void take_answers(const ist_proximity::ProximityArray::ConstPtr& answers);
   void take(const ist_proximity::ProximityArray::ConstPtr& answers, PlacedAnswers* placed);
   void take_joints(const sensor_msgs::JointState& message);
   void take_scale(const std_msgs::Float64& scale);
@@ -104,8 +102,7 @@ class CommandFilter {
   std::shared_ptr<const Kinematics> kinematics_;  ///< null: no URDF yet
   std::string robot_fault_;                       ///< why there is none
   std::string urdf_;
-  bool joints_are_stated_;          ///< by ~joints
-  std::uint8_t newest_status_ = 0;  ///< of the node's answers
+  bool joints_are_stated_;  ///< by ~joints
   std::optional<JointHistory> history_;
   std::optional<ProximityRows> proximity_;
   std::optional<VelocityFilter> filter_;
