@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
-from joint_states_test import ARM, JointStatesTest, joint_state, motion
+from joint_states_test import ARM, JointStatesTest, joint_state
 from proximity_testing import LinkProximity, ProximityArray
 
 from ist_proximity.msg import JointRepulsion, LinkPair
@@ -112,6 +112,11 @@ class SelfProximityTest(unittest.TestCase):
         node = self.start("late")
         self.joints.stop()
         publisher = JointStatesTest.joint_publisher(self.namespace)
+
+        def motion(t):
+            """The slide speeds up by up to 0.2 m/s from one rare sample to the next."""
+            return {"turn": np.sin(0.7 * t), "slide": 0.5 + 0.3 * np.sin(3.0 * t)}
+
         for often, rare in (("turn", "slide"), ("slide", "turn")):
             sent = []
 
@@ -138,7 +143,7 @@ class SelfProximityTest(unittest.TestCase):
             self.assertGreater(len(beyond), 120)
             if rare == "slide":
                 self.assertGreater(max(beyond), 0.002)  # the joint that is late matters
-                self.assertLess(np.median(below), 0.05)
+                self.assertLess(np.median(below), 0.12)
             else:
                 self.assertLess(np.median(below), 0.007)
 

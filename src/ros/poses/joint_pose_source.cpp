@@ -146,7 +146,9 @@ bool JointPoseSource::must_hold(const ros::Time& instant) const {
 }
 
 /// A joint that comes less often than others keeps its position until its next sample: it moves on
-/// as fast as it did of late, or as it says.
+/// as fast as it did of late, or as it says, and speeds up as it did of late. With a constant
+/// acceleration a, samples T apart and a lag up to T, that is all: its mean rate is a (T + lag) / 2
+/// more than that between its last two samples, and theirs is a T more than the one before.
 void JointPoseSource::find_lags(const ros::Time& instant) {
   const auto& joints = kinematics_->joints();
   lags_.assign(joints.size(), {0.0, 0.0, 0.0});
@@ -156,8 +158,9 @@ void JointPoseSource::find_lags(const ros::Time& instant) {
     const JointPosition& position = positions_[j];
     const double lag = seconds_between(position.stamp, instant);
     if (!(lag > 0.0)) continue;
-    double speed = std::fmax(position.speed, position.speed_before);
-    speed = std::fmax(speed, std::abs(position.velocity));
+    const double change = std::abs(position.rate - position.rate_before);
+    double speed = std::fmax(std::abs(position.rate), std::abs(position.velocity));
+    if (!std::isnan(change)) speed += change;
     // What is faster than the joint's limit is a jump of what is stated.
     speed = std::fmin(speed, joints[j].speed);
     // A URDF without a limit, and a single sample: nothing is known of its motion.

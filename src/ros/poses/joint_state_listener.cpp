@@ -284,10 +284,10 @@ void JointStateListener::use(const Stated& stated, const ros::Time& stamp,
   const double interval = seconds_between(position.stamp, stamp);
   if (position.stamp.isZero() || interval > kMaxSpacing) {
     position.spacing = 0.0;
-    position.speed = position.speed_before = std::numeric_limits<double>::quiet_NaN();
+    position.rate = position.rate_before = std::numeric_limits<double>::quiet_NaN();
   } else if (is_later) {
-    position.speed_before = position.speed;
-    position.speed = std::abs(stated.q - position.q) / interval;
+    position.rate_before = position.rate;
+    position.rate = (stated.q - position.q) / interval;
     // The longest interval of late, so that one that varies is no alarm.
     position.spacing = std::max(interval, 0.9 * position.spacing + 0.1 * interval);
   }

@@ -30,10 +30,10 @@ struct JointPosition {
   ros::Time stamp;
   ros::Time sent;        ///< the message's stamp
   double spacing = 0.0;  ///< [s] usual time between two stamps; 0: not known yet
-  /// [rad/s, m/s] How fast it moved between the last two stamps, and between those before; NaN: not
+  /// [rad/s, m/s] Its mean rate between the last two stamps, and between those before; NaN: not
   /// known yet.
-  double speed = std::numeric_limits<double>::quiet_NaN();
-  double speed_before = std::numeric_limits<double>::quiet_NaN();
+  double rate = std::numeric_limits<double>::quiet_NaN();
+  double rate_before = std::numeric_limits<double>::quiet_NaN();
   /// Another joint that was in the same message; itself when there was none.
   std::size_t companion = 0;
   std::shared_ptr<const std::string> refusal;  ///< why the newest sample is not used; null: it is
