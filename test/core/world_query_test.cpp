@@ -259,6 +259,12 @@ TEST(WorldQuery, AMarginReachesIntoTheRange) {
   EXPECT_EQ(r.state, LinkState::kNear);
   EXPECT_NEAR(r.distance, 1.1, 1e-9);
   EXPECT_NEAR(r.lower_bound, 0.7, 0.0011);
+  // So far away that the sphere about the object and its neighbours is outside, too.
+  objects[0].X_BO = at(1.8, 0.0, 0.0);
+  EXPECT_EQ(answer_at(&query, posed(objects)).state, LinkState::kClear);
+  objects[0].margin = 0.9;
+  EXPECT_NEAR(answer_at(&query, posed(objects)).lower_bound, 0.7, 0.0011);
+  objects[0] = object_of("far", cube(0.2), at(1.3, 0.0, 0.0));
   // The list of objects in range was made without the link's margin.
   WorldQuery other(ball());
   objects[0].margin = 0.0;
