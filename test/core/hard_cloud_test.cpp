@@ -104,6 +104,27 @@ TEST(HardCloud, OrderAndDuplicatesDoNotMatter) {
   }
 }
 
+// Of walls and rows in which every point stands three times, tiles begin where a point of another
+// tile was measured: that they hold others is not forgotten.
+TEST(HardCloud, WallsAndRowsOfDuplicates) {
+  test::Rng rng(62);
+  for (int scene = 0; scene < test::scaled(300); ++scene) {
+    const int axis = scene % 3, other = (axis + 1) % 3;
+    const bool is_row = scene % 2 == 0;
+    Points points;
+    for (int i = 0; i < 900; ++i) {
+      const int grid = i / 3;
+      Point p = 0.02 * (is_row ? Point(grid, grid, grid) : Point(grid % 20, grid % 20, grid / 20));
+      p[axis] = 0.3;
+      if (!is_row) p[other] = 0.02 * (grid / 20);
+      if (is_row) p[other] = 0.1;
+      points.push_back(p - Point(0.2, 0.2, 0.2));
+    }
+    std::shuffle(points.begin(), points.end(), rng);
+    common_links().expect(points, test::random_pose(&rng, 0.4));
+  }
+}
+
 template <typename Scalar>
 RawCloud raw(const std::vector<Scalar>& xyz) {
   return packed_cloud(xyz.data(), xyz.size() / 3, 1);
