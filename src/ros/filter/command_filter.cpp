@@ -31,6 +31,8 @@ constexpr double kSpeedWindow = 0.05;
 constexpr double kMaxSpeed = 10.0;
 // [s] The solver ends by then, and the command is scaled: a hundred times what it takes as a rule.
 constexpr double kTimeLimit = 0.0005;
+// Joints that are commanded apart have commands that come at once: none takes another's place.
+constexpr std::uint32_t kQueue = 10;
 // Zeros where commands or data are late come this often, as commands do.
 const ros::WallDuration kZeroPeriod(0.01);
 // [s] For so long, joints that are not commanded any more are given 0 beside others that are.
@@ -111,7 +113,7 @@ void CommandFilter::subscribe() {
   }
   safe_command_ = private_nh_.advertise<Message>("safe_command", 1);
   command_ = private_nh_.subscribe<Message>(
-      "command", 1,
+      "command", kQueue,
       boost::function<void(const boost::shared_ptr<const Message>&)>(
           [this](const boost::shared_ptr<const Message>& message) { receive(*message); }),
       ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
@@ -133,7 +135,7 @@ void CommandFilter::receive(const Message& message) {
     state->joints = command.joints;
     state->velocity = velocity;
     state->computation_time = time;
-    note_given(*state);
+    note_given(*state, command.jacobian.size() > 0);
     publish_message(state_, *state);
   };
   FilterState state;
@@ -438,36 +440,45 @@ const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::T
     command_column_[column] = command.velocity[i];
   }
   for (std::size_t c = 0; c < q_column_.size(); ++c) q_column_[c] = q_now_[proximity_->joints()[c]];
-  hold_others(is_commanded);
+  hold_others(is_commanded, now);
   take_off_given(now, config_.rows.horizon);
   return filter_->run(command_column_, q_column_, rows_, kTimeLimit);
 }
 
-/// Joints that are not commanded go on as they move now: what they do comes off the limits, and
-/// their columns are 0.
-void CommandFilter::hold_others(const std::vector<bool>& is_commanded) {
+/// Joints that are not commanded go on as they move now, or as they were told to since the joints
+/// were stated: what they do comes off the limits, and their columns are 0.
+void CommandFilter::hold_others(const std::vector<bool>& is_commanded, const ros::Time& now) {
+  const double age = history_->age(now);
   for (std::size_t c = 0; c < is_commanded.size(); ++c) {
     if (is_commanded[c]) continue;
-    const double speed = history_->velocity(proximity_->joints()[c], kSpeedWindow);
+    double least = history_->velocity(proximity_->joints()[c], kSpeedWindow), most = least;
+    double until = 0.0;  // [s] before now
+    for (auto given = given_.rbegin(); given != given_.rend() && until <= age; ++given) {
+      least = std::min(least, given->velocity[c]);
+      most = std::max(most, given->velocity[c]);
+      until = seconds_between(given->time, now);
+    }
+    const double speed = std::max(std::abs(least), std::abs(most));
     const auto column = static_cast<Eigen::Index>(c);
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.count); ++i) {
-      rows_.h[i] -= rows_.G(i, column) * speed;
-      rows_.sweep_limit[i] =
-          std::max(0.0, rows_.sweep_limit[i] - rows_.sweep(i, column) * std::abs(speed));
+      rows_.h[i] -= std::max(rows_.G(i, column) * least, rows_.G(i, column) * most);
+      rows_.sweep_limit[i] = std::max(0.0, rows_.sweep_limit[i] - rows_.sweep(i, column) * speed);
       rows_.G(i, column) = rows_.sweep(i, column) = 0.0;
     }
   }
 }
 
-/// Remembers a velocity for take_off_given().
-void CommandFilter::note_given(const FilterState& state) {
+/// Remembers a velocity for take_off_given() and hold_others(). Joints that it does not name go on
+/// with the one before; a twist replaces all.
+void CommandFilter::note_given(const FilterState& state, bool replaces_all) {
   if (!proximity_) return;
-  std::vector<double> speeds(proximity_->joints().size(), 0.0);
+  std::vector<double> velocity(proximity_->joints().size(), 0.0);
+  if (!given_.empty() && !replaces_all) velocity = given_.back().velocity;
   for (std::size_t i = 0; i < state.joints.size(); ++i) {
     const auto column = column_of(state.joints[i]);
-    if (column) speeds[*column] = std::abs(state.velocity[i]);
+    if (column) velocity[*column] = state.velocity[i];
   }
-  given_.push_back({state.header.stamp, std::move(speeds)});
+  given_.push_back({state.header.stamp, std::move(velocity)});
   // A joint state that counts is no older; the first velocity was given before that.
   while (given_.size() > 1 &&
          seconds_between(given_[1].time, state.header.stamp) > config_.joint_timeout) {
@@ -483,7 +494,8 @@ void CommandFilter::take_off_given(const ros::Time& now, double horizon) {
   double until = 0.0;  // [s] before now
   for (auto given = given_.rbegin(); given != given_.rend() && until < age; ++given) {
     const double from = std::clamp(seconds_between(given->time, now), until, age);
-    moved += (from - until) * Eigen::Map<const Eigen::VectorXd>(given->speeds.data(), moved.size());
+    const Eigen::Map<const Eigen::VectorXd> velocity(given->velocity.data(), moved.size());
+    moved += (from - until) * velocity.cwiseAbs();
     until = from;
   }
   for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.count); ++i) {

@@ -83,8 +83,8 @@ class CommandFilter {
                       const ros::Time& now) const;
   const FilterAnswer& run(const JointCommand& command, const ros::Time& now);
   bool is_twist_proven(const JointCommand& command, const std::vector<double>& velocity);
-  void hold_others(const std::vector<bool>& is_commanded);
-  void note_given(const ist_proximity::FilterState& state);
+  void hold_others(const std::vector<bool>& is_commanded, const ros::Time& now);
+  void note_given(const ist_proximity::FilterState& state, bool replaces_all);
   void take_off_given(const ros::Time& now, double horizon);
   /// Whether it can be read and is of the robot's joints.
   bool can_be_used(const JointCommand& command) const;
@@ -111,7 +111,7 @@ class CommandFilter {
   std::vector<double> q_now_, q_column_, command_column_;
   struct Given {
     ros::Time time;
-    std::vector<double> speeds;  ///< [rad/s, m/s] >= 0, by column
+    std::vector<double> velocity;  ///< [rad/s, m/s] by column
   };
   std::deque<Given> given_;  ///< of the time that joint states may be old
 
