@@ -66,6 +66,8 @@ class LaserScanTest(unittest.TestCase):
         self.world = pt.World(self.namespace, X_BASE_LASER).stand(box=FAR_BOX)
         self.publisher = rospy.Publisher(self.namespace + "/scan", LaserScan, queue_size=10)
         source = {"topic": "scan", "type": "sensor_msgs/LaserScan"}
+        if "turns_back" in self._testMethodName:
+            source["timeout"] = 3.0  # its scans take a second
         self.node = pt.ProximityNode(
             self.namespace, {"sources": {"laser": source}, "query/tolerance": 0.0}, pt.urdf()
         )
@@ -186,6 +188,37 @@ class LaserScanTest(unittest.TestCase):
         self.assertGreater(len(distances), 100)
         self.assertLess(max(abs(np.array(distances) - 0.25)), 1e-3)
         print("moving sensor: largest error %.2f mm" % (1e3 * max(abs(np.array(distances) - 0.25))))
+
+    def test_sensor_that_turns_back(self):
+        """Between its ends a scan follows the sensor, which is at one place at both."""
+        duration, amplitude, point = 1.0, 0.15, 0.35
+
+        def X_base_moving(t):
+            return pt.transform((-0.6 - amplitude * np.cos(2 * np.pi * t / duration), 0.0, 0.0))
+
+        def make():
+            stamp = rospy.Time.now()
+            at_point = X_base_moving(stamp.to_sec() + 0.5 * duration)[0, 3]
+            ranges = [float("inf")] * 101
+            ranges[50] = point - at_point
+            return scan(
+                ranges,
+                stamp,
+                "moving",
+                angle_min=-0.5,
+                angle_increment=0.01,
+                time_increment=duration / 100,
+            )
+
+        self.world.poses["moving"] = ("base", X_base_moving)
+        with self.stream(make):
+            self.node.wait_for_status(ProximityArray.OK)
+            messages = self.node.next_messages(200)
+        distances = [pt.link(m, "ball_link").distance for m in messages if m.status == 0]
+        self.assertGreater(len(distances), 100)
+        error = max(abs(np.array(distances) - 0.25))
+        print("sensor that turns back: largest error %.2f mm" % (1e3 * error))
+        self.assertLess(error, 0.02)
 
 
 if __name__ == "__main__":

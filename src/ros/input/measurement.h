@@ -29,8 +29,8 @@ namespace ist {
 
 /// The poses of sensor and robot while something was measured.
 struct Placement {
-  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();      ///< sensor at the first instant
-  Eigen::Isometry3d X_FS_end = Eigen::Isometry3d::Identity();  ///< sensor at the last instant
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();  ///< sensor at the first instant
+  std::vector<Eigen::Isometry3d> X_FS_at;                  ///< sensor at each instant
   /// For the self-filter: links whose poses are known at all instants, at each of the instants.
   std::vector<PosedSolid> robot;
   /// By element of `robot`: the first and the last instant for which it stands.

@@ -103,13 +103,13 @@ std::string SensorSource::find_poses(const Measurement& measurement, Placement* 
   const std::string sensor = without_slash(measurement.header.frame_id);
   const std::vector<ros::Time>& instants = measurement.instants;
   if (instants.empty()) return "";
-  std::string problem =
-      look_up(buffer_, target_.fixed_frame, sensor, instants.front(), &placement->X_FS);
-  placement->X_FS_end = placement->X_FS;
-  if (problem.empty() && instants.size() > 1) {
-    problem = look_up(buffer_, target_.fixed_frame, sensor, instants.back(), &placement->X_FS_end);
+  for (const ros::Time& time : instants) {
+    std::string problem = look_up(buffer_, target_.fixed_frame, sensor, time, &placement->X_FS);
+    if (!problem.empty()) return problem;
+    placement->X_FS_at.push_back(placement->X_FS);
   }
-  if (!problem.empty() || !config_.ingest.self_filter) return problem;
+  placement->X_FS = placement->X_FS_at.front();
+  if (!config_.ingest.self_filter) return "";
   placement->known.assign(target_.model->links.size(), true);
   std::vector<std::size_t> last(target_.model->links.size(), kNowhere);
   for (std::size_t i = 0; i < instants.size(); ++i) {
