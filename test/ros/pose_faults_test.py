@@ -13,7 +13,7 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from joint_states_test import ARM, joint_state, motion
-from proximity_testing import ProximityArray
+from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import JointState
 
 STILL = {"turn": 0.3, "slide": 0.5}
@@ -294,6 +294,30 @@ class PoseFaultsTest(unittest.TestCase):
         lines = node._log.read().decode().splitlines()
         about_tf = [line for line in lines if "ball_link" in line or "TF_" in line or "tf2" in line]
         self.assertLess(len(about_tf), 10, "\n".join(about_tf))
+
+    def test_static_transform_that_moves(self):
+        """tf2 keeps it without time: its last pose would count for ever."""
+        node = self.start(pt.urdf(), pose_source="tf")
+        self.world.poses = {"box_link": ("base", pt.transform((0, 0.8, 0)))}
+        self.world.start_tf()
+
+        def stand():
+            X = pt.transform()
+            statics = [pt.transform_message("base", f, X, rospy.Time.now()) for f in ("camera", "ball_link")]
+            self.world._tf_static.publish(statics)
+
+        stand()
+        node.wait_for_status(ProximityArray.OK)
+        self.world.poses["ball_link"] = ("base", lambda t: pt.transform((0.1 * np.sin(t), 0, 0)))
+        message = node.wait_for_status(ProximityArray.NO_POSE, "was static, and ")
+        self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.UNKNOWN)
+        self.assertNotEqual(pt.link(message, "box_link").state, LinkProximity.UNKNOWN)
+        del self.world.poses["ball_link"]
+        begin = len(node.messages)
+        node.wait_for(lambda m: len(node.messages) > begin + 100, "some more")
+        self.assertEqual({m.status for m in node.messages[begin:]}, {ProximityArray.NO_POSE})
+        stand()
+        node.wait_for_status(ProximityArray.OK)
 
     def test_rival_of_joint_states(self):
         node = self.start()

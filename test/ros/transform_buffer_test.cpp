@@ -261,6 +261,23 @@ TEST(TransformBuffer, disputesEndWithTheirPublisher) {
   EXPECT_EQ(buffer.dispute("base", "tool"), "");
 }
 
+// tf2 keeps what was static without time, so that its last pose would never be old.
+TEST(TransformBuffer, distrustsStaticTransformsThatMove) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  auto first = boost::make_shared<ros::M_string>();
+  const auto second = boost::make_shared<ros::M_string>();
+  const ros::Time now(100.0);
+  buffer.add(transform("base", "camera", 0.0, 0.1), {"/a", first}, true, now);
+  buffer.add(transform("camera", "optical", 0.0), {"/a", first}, true, now);
+  first.reset();
+  buffer.add(transform("base", "camera", 100.0, 0.1), {"/b", second}, false, now);
+  EXPECT_NE(buffer.dispute("base", "optical").find("/b moves it now"), std::string::npos);
+  buffer.clear();
+  EXPECT_NE(buffer.dispute("base", "optical"), "");
+  buffer.add(transform("base", "camera", 0.0, 0.2), {"/b", second}, true, now);
+  EXPECT_EQ(buffer.dispute("base", "optical"), "");
+}
+
 // A slow publisher beside a fast one, three publishers, and clocks that differ.
 TEST(TransformBuffer, disputesDoNotFlicker) {
   TransformBuffer buffer(ros::Duration(10.0));

@@ -87,7 +87,9 @@ void TransformBuffer::forget_moving() {
       kept.refused_until = record.refused_until;
     }
     record.statements.forget_moving();
-    if (kept.refusal.empty() && record.statements.empty()) {
+    kept.is_static_in_tf = record.is_static_in_tf;
+    kept.frozen = record.frozen;
+    if (kept.refusal.empty() && record.statements.empty() && !kept.is_static_in_tf) {
       if (!record.statements.dispute().empty()) --disputes_;
       entry = records_.erase(entry);
       continue;
@@ -148,6 +150,7 @@ std::string TransformBuffer::note(const geometry_msgs::TransformStamped& transfo
   if (!record) return format_text("is not used: there are %zu frames", kMaxFrames);
   change_statements([&](FrameStatements* all) { all->add(transform, publisher, is_static, now); },
                     record);
+  note_turn(transform, publisher, is_static, record);
   const ros::Time& stamp = transform.header.stamp;
   const double behind = seconds_between(stamp, record->newest);
   if (!is_static && !record->newest.isZero() && behind > getCacheLength().toSec()) {
@@ -176,6 +179,26 @@ std::string TransformBuffer::note(const geometry_msgs::TransformStamped& transfo
     record->refusal.clear();
   }
   return "";
+}
+
+/// Notes whether tf2 has a frame without time, and whether it moves all the same: what the URDF or
+/// joint states say is not looked up by its age. The caller holds mutex_.
+void TransformBuffer::note_turn(const geometry_msgs::TransformStamped& transform,
+                                const TransformPublisher& publisher, bool is_static,
+                                Record* record) {
+  if (is_static) {
+    record->is_static_in_tf = record->is_static_in_tf || record->newest.isZero();
+    if (!record->frozen.empty()) --disputes_;
+    return record->frozen.clear();
+  }
+  if (!record->is_static_in_tf || !record->frozen.empty() || !publisher.has_connection ||
+      !record->statements.statics().empty()) {
+    return;
+  }
+  ++disputes_;
+  record->frozen = "the transform from '" + without_slash(transform.child_frame_id) + "' to '" +
+                   without_slash(transform.header.frame_id) + "' was static, and " +
+                   publisher.name + " moves it now: start this node again";
 }
 
 /// The record of a frame; null where there are too many. The caller holds mutex_.
@@ -328,6 +351,7 @@ std::string TransformBuffer::dispute(const std::string& fixed, const std::string
   for (const Record* record : between(fixed, frame)) {
     const std::string& dispute = record->statements.dispute();
     if (!dispute.empty()) return dispute;
+    if (!record->frozen.empty()) return record->frozen;
   }
   return "";
 }

@@ -28,7 +28,9 @@ namespace ist {
 /// static transform is sent once, so the reason of its refusal stays until another takes its place.
 /// The buffer also remembers which transforms were stamped ahead of the clock, so that their age
 /// counts from their receipt, and which frames two publishers state differently (see
-/// FrameStatements). Where a dispute ends, the static transform that is left counts. Thread safe.
+/// FrameStatements). Where a dispute ends, the static transform that is left counts. What was
+/// static stays so in tf2, for which it never is old: where /tf moves it from then on, its pose is
+/// in dispute until it is static again. Thread safe.
 class TransformBuffer : public tf2::BufferCore {
  public:
   /// @param cache_time  how long transforms are kept
@@ -100,6 +102,8 @@ class TransformBuffer : public tf2::BufferCore {
     Clock::time_point refused_until;  ///< the largest there is: of a static one, not sent again
     int good_since = 0;               ///< transforms of that publisher that were used since
     FrameStatements statements;
+    bool is_static_in_tf = false;  ///< tf2 has it without time, whatever comes later
+    std::string frozen;            ///< a sentence: it moves all the same; empty: it does not
 
     bool is_refused_for_good() const { return refused_until == Clock::time_point::max(); }
   };
@@ -115,6 +119,8 @@ class TransformBuffer : public tf2::BufferCore {
                      const std::string& fault, bool is_static);
   template <typename Change>
   void change_statements(const Change& change, Record* record);
+  void note_turn(const geometry_msgs::TransformStamped& transform,
+                 const TransformPublisher& publisher, bool is_static, Record* record);
   Record* find_or_make(const std::string& child);
   void forget_moving();
   bool way_up(const std::string& end, const std::string& frame,
@@ -127,7 +133,7 @@ class TransformBuffer : public tf2::BufferCore {
   std::atomic<std::size_t> lasting_refusals_{0};  ///< records that are refused for good
   std::atomic<Clock::time_point> refused_until_{Clock::time_point()};  ///< the last one
   bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
-  std::atomic<std::size_t> disputes_{0};  ///< records with a dispute
+  std::atomic<std::size_t> disputes_{0};  ///< records with a dispute, and those that are frozen
   ros::Time last_now_;
   std::set<std::string> ignored_;
 
