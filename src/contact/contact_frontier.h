@@ -18,8 +18,8 @@ class ContactFrontier {
     std::int32_t child;   ///< of the hierarchy
   };
 
-  ContactFrontier() {
-  }  // NOLINT(modernize-use-equals-default): `= default` and {} would write zeros
+  // NOLINTNEXTLINE(modernize-use-equals-default): `= default` and {} would write zeros
+  ContactFrontier() {}
 
   bool empty() const { return size_ == 0; }
   bool has_room(std::size_t count) const { return size_ + count <= kCapacity; }

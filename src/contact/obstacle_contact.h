@@ -54,7 +54,7 @@ class ObstacleContact {
   void sum_subtree(const Entry& entry);
   void sum_leaf(const Entry& entry);
   void sum_points(std::int32_t leaf);
-  void sum_boxes(std::int32_t tile);
+  void sum_boxes(std::int32_t child);
   void sum_cells(const Eigen::AlignedBox3d& box, const CellBound& bound, int halvings);
   template <typename Weight>
   void add(const Eigen::Vector3d& p_L, double radius, const Weight& weight);

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "internal/geometry/numbers.h"
 #include "internal/geometry/solid_queries.h"
 
 namespace ist {
@@ -119,6 +120,25 @@ VolumeElements::VolumeElements(const Solid& solid, const OutwardField& field) {
   elements_.shrink_to_fit();
 }
 
+// [m^3] Of the blocks from this one on that are near a solid.
+double VolumeElements::volume_near(std::size_t first, const Eigen::AlignedBox3d& solid_box,
+                                   const Eigen::Isometry3d& X_SL) const {
+  double volume = 0.0;
+  for (std::size_t i = first; i < blocks_.size(); ++i) {
+    if (is_near(blocks_[i], solid_box, X_SL)) volume += blocks_[i].volume;
+  }
+  return volume;
+}
+
+// [m] How deep a block's middle is inside; -inf where no point of the block can be.
+double VolumeElements::depth_of(const Block& block, const Solid& solid,
+                                const Eigen::AlignedBox3d& solid_box,
+                                const Eigen::Isometry3d& X_SL) {
+  if (!is_near(block, solid_box, X_SL)) return -kInfinity;
+  // In a mesh with holes the signed distance jumps where its inside ends without a surface.
+  return solid.is_closed() ? -solid.signed_distance(X_SL * block.center).distance : 0.0;
+}
+
 // Blocks that are wholly inside hold the most and cost the least: they are summed first.
 ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox3d& solid_box,
                                      const Eigen::Isometry3d& X_SL, Deadline* deadline,
@@ -137,13 +157,9 @@ ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox
     in_block = 0.0;
     return true;
   };
-  for (; done < blocks_.size(); ++done) {
-    if (deadline->passed_now_and_then(kDistancesBetweenLooks)) break;
+  for (; done < blocks_.size() && !deadline->passed_now_and_then(kDistancesBetweenLooks); ++done) {
     const Block& block = blocks_[done];
-    if (!is_near(block, solid_box, X_SL)) continue;
-    // In a mesh with holes the signed distance jumps where its inside ends without a surface.
-    const double depth =
-        solid.is_closed() ? -solid.signed_distance(X_SL * block.center).distance : 0.0;
+    const double depth = depth_of(block, solid, solid_box, X_SL);
     if (-depth >= block.radius) continue;
     if (depth >= block.radius) {
       if (!add_block(block, nullptr)) break;
@@ -154,7 +170,7 @@ ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox
     }
   }
   while (done_cuts < cuts && !deadline->has_passed()) {
-    if (add_block(blocks_[cut[done_cuts]], &solid)) ++done_cuts;
+    done_cuts += add_block(blocks_[cut[done_cuts]], &solid) ? 1 : 0;
   }
   // A block in which time ended is counted by its elements that are left.
   *rest = in_block;
@@ -163,9 +179,7 @@ ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox
   for (std::size_t i = done_cuts + (is_cut ? begun : 0); i < cuts; ++i) {
     *rest += blocks_[cut[i]].volume;
   }
-  for (std::size_t i = done + (is_cut ? 0 : begun); i < blocks_.size(); ++i) {
-    if (is_near(blocks_[i], solid_box, X_SL)) *rest += blocks_[i].volume;
-  }
+  *rest += volume_near(done + (is_cut ? 0 : begun), solid_box, X_SL);
   return sum;
 }
 

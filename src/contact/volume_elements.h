@@ -59,6 +59,10 @@ class VolumeElements {
                       const Eigen::Isometry3d& X_SL) {
     return solid_box.exteriorDistance(Eigen::Vector3d(X_SL * block.center)) < block.radius;
   }
+  double volume_near(std::size_t first, const Eigen::AlignedBox3d& solid_box,
+                     const Eigen::Isometry3d& X_SL) const;
+  static double depth_of(const Block& block, const Solid& solid,
+                         const Eigen::AlignedBox3d& solid_box, const Eigen::Isometry3d& X_SL);
 
   Eigen::AlignedBox3d box_;
   std::vector<VolumeElement> elements_;

@@ -180,7 +180,7 @@ TEST(PairTouch, ACornerIsAsDeepAsItIs) {
           .toRotationMatrix();
   const double corner = 0.1 * std::sqrt(3.0);  // [m] its height
   for (const double max_error : {0.02, 0.005}) {
-    Pair pair(test::box({0.2, 0.2, 0.2}), Box{{0.6, 0.6, 0.6}}, max_error);
+    Pair pair(test::box({0.2, 0.2, 0.2}), Sphere{0.3}, max_error);
     pair.X_FL[0].linear() = corner_up;
     for (double depth = 1e-4; depth < 0.05; depth *= 1.3) {
       pair.X_FL[1].translation() = Eigen::Vector3d(0.3 + corner - depth, 0.0, 0.0);

@@ -73,7 +73,7 @@ ViewCalibration::Matrix6 ViewCalibration::solve(Vector6* step) {
   residual_ = std::sqrt(sum_sq_ / count_);
   const Matrix6 stated = stated_.asDiagonal();
   const Matrix6 kept = kKept * information_, fresh = (1.0 - kKept) * stated;
-  const Matrix6 information = kept + fresh + sum_;
+  Matrix6 information = kept + fresh + sum_;
   const Vector6 right = -sum_height_ - kept * (applied_ - before_) - fresh * applied_;
   const Eigen::LDLT<Matrix6> solver(information);
   *step = solver.solve(right);
