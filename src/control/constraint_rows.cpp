@@ -305,8 +305,9 @@ double ConstraintRowBuilder::retreat(Eigen::Index row) const {
 }
 
 ConstraintRows constraint_rows(const RobotModel& model,
-                               std::shared_ptr<const Kinematics> kinematics, Span<const double> q,
-                               Span<const LinkProximity> answers, const RowConfig& config) {
+                               const std::shared_ptr<const Kinematics>& kinematics,
+                               Span<const double> q, Span<const LinkProximity> answers,
+                               const RowConfig& config) {
   ConstraintRowBuilder builder(model, kinematics, {}, answers.size());
   ForwardKinematics forward(model, kinematics);
   std::vector<double> positions(kinematics->joints().size(),

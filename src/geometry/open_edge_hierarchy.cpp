@@ -18,6 +18,7 @@ constexpr float kFarAway = 1e6F;  // [m]
 
 std::vector<Edge> edges_of(const TriangleMesh& mesh, const std::vector<OpenEdge>& open) {
   std::vector<Edge> edges;
+  edges.reserve(open.size());
   for (const OpenEdge& edge : open) {
     edges.push_back(
         {mesh.vertices[edge.from], mesh.vertices[edge.to], static_cast<double>(edge.count)});

@@ -243,7 +243,9 @@ void LinkPairQuery::bound_by_slabs() {
   take(b_.solid.signed_distance(closest.on_q).normal);
   take(-(X_BA_.linear() * a_.solid.signed_distance(X_BA_.inverse() * closest.on_p).normal));
   for (double turn = kFirstTurn; turn > kLastTurn && -width < wanted - config_.tolerance;) {
-    const Eigen::Vector3d x_B = up_B.unitOrthogonal(), y_B = up_B.cross(x_B), from_B = up_B;
+    // NOLINTNEXTLINE(performance-unnecessary-copy-initialization): take() changes up_B
+    const Eigen::Vector3d from_B = up_B;
+    const Eigen::Vector3d x_B = from_B.unitOrthogonal(), y_B = from_B.cross(x_B);
     bool is_thinner = false;
     for (const double sign : {-turn, turn}) {
       is_thinner = take((from_B + sign * x_B).normalized()) || is_thinner;

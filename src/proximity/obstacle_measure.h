@@ -93,13 +93,13 @@ class BoxMeasure : public ObstacleMeasure<BoxBvh> {
 
   /// Measures a box that is known to be outside.
   /// @returns [m] a lower bound of its distance
-  float measure_outside(const SearchEntry& box, float rounding);
+  float measure_outside(const SearchEntry& entry, float rounding);
   struct Found {
     bool is_outside;  ///< as a whole
     float bound;      ///< [m] no point of the box has a smaller signed distance
   };
   /// Measures a box that may be inside.
-  Found measure_box(const SearchEntry& box);
+  Found measure_box(const SearchEntry& entry);
   /// Whether a part with this bound may hold a place so much deeper that it matters, and may still
   /// be divided.
   bool may_divide(float bound) const;

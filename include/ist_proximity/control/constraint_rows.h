@@ -204,7 +204,8 @@ class ConstraintRowBuilder {
 ///                 is not known. Of another size: the rows are not complete
 /// @param answers  by link of the model, at q, with the root link's frame as the fixed frame
 ConstraintRows constraint_rows(const RobotModel& model,
-                               std::shared_ptr<const Kinematics> kinematics, Span<const double> q,
-                               Span<const LinkProximity> answers, const RowConfig& config = {});
+                               const std::shared_ptr<const Kinematics>& kinematics,
+                               Span<const double> q, Span<const LinkProximity> answers,
+                               const RowConfig& config = {});
 
 }  // namespace ist
