@@ -148,6 +148,25 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   return complete;
 }
 
+namespace {
+
+// The k-th of all indices, of which one comes before the others.
+std::size_t index_at(std::size_t k, std::size_t first) {
+  if (k == 0) return first;
+  return k <= first ? k - 1 : k;
+}
+
+// Lowers the bounds of the nearest link to what is proven of all: with the points' extents, and
+// without. Where some are not known, nothing is.
+void lower(double proven, double proven_points, LinkProximity* answer) {
+  const double points = std::min(answer->lower_bound + answer->sensor_width, proven_points);
+  answer->lower_bound = std::min(answer->lower_bound, proven);
+  if (answer->sensor_width <= 0.0 || proven == -kInfinity) return;
+  answer->sensor_width = std::max(points - answer->lower_bound, 0.0);
+}
+
+}  // namespace
+
 bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                                  SnapshotSpan clouds, RobotProximity* result) {
   const std::size_t count = impl_->links.size();
@@ -163,7 +182,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   // The link that was nearest last time comes first: its upper bound prunes most of the others.
   const std::size_t first = impl_->last_nearest;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = k == 0 ? first : k <= first ? k - 1 : k;
+    const std::size_t i = index_at(k, first);
     if (!impl_->can_query(i, X_FL, known, clouds)) {
       result->all_known = false;
       continue;
@@ -189,10 +208,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   LinkProximity& answer = result->nearest;
   if (answer.state == LinkState::kNear || answer.state == LinkState::kContact) {
     result->link = static_cast<std::int32_t>(best);
-    const double points = std::min(answer.lower_bound + answer.sensor_width, proven_points);
-    answer.lower_bound = std::min(answer.lower_bound, proven);
-    if (answer.sensor_width > 0.0) answer.sensor_width = std::max(points - answer.lower_bound, 0.0);
-    if (!result->all_known) answer.lower_bound = -kInfinity;
+    lower(result->all_known ? proven : -kInfinity, proven_points, &answer);
     impl_->last_nearest = best;
   } else if (!complete || !all_in_regions || !result->all_known) {
     answer.reset();

@@ -157,6 +157,7 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   JointPoses poses;
   kinematics.place_joints(q, &poses);
   std::vector<bool> has_no_rest;
+  has_no_rest.reserve(joints.size());
   for (const auto& joint : joints) has_no_rest.push_back(joint.has_unstated_pose());
   const std::vector<std::size_t> group_of_body = groups_of_bodies(kinematics, has_no_rest, &poses);
   // The kinematics outlives this call, so the pointer does not own it.
@@ -178,12 +179,26 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   return found;
 }
 
+namespace {
+
+/// A position within a joint's limits, or within a turn; NaN for a mimic joint, which follows.
+double draw(const Kinematics::Joint& joint, std::mt19937_64* random) {
+  constexpr double kHalfTurn = 3.14159265358979323846;  // [rad]
+  const bool has_limits = std::isfinite(joint.lower) && std::isfinite(joint.upper);
+  const double low = has_limits ? joint.lower : -kHalfTurn;
+  const double high = has_limits ? joint.upper : kHalfTurn;
+  // Not std::uniform_real_distribution, which differs between libraries.
+  const double drawn = low + (high - low) * static_cast<double>((*random)() >> 11) * 0x1p-53;
+  return joint.is_free() ? drawn : std::nan("");
+}
+
+}  // namespace
+
 std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& model,
                                       const Kinematics& kinematics,
                                       const std::vector<LinkPair>& pairs,
                                       const PairSampling& sampling,
                                       const std::function<bool()>& cancelled) {
-  constexpr double kHalfTurn = 3.14159265358979323846;  // [rad]
   const auto& joints = kinematics.joints();
   std::vector<SampledPair> sampled;
   sampled.reserve(pairs.size());
@@ -201,14 +216,7 @@ std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& m
   }
   JointPoses poses;
   for (std::size_t i = 0; i < sampling.configurations && !(cancelled && cancelled()); ++i) {
-    for (std::size_t j = 0; j < joints.size(); ++j) {
-      const bool has_limits = std::isfinite(joints[j].lower) && std::isfinite(joints[j].upper);
-      const double low = has_limits ? joints[j].lower : -kHalfTurn;
-      const double high = has_limits ? joints[j].upper : kHalfTurn;
-      // Not std::uniform_real_distribution, which differs between libraries.
-      const double drawn = low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
-      q[j] = joints[j].is_free() ? drawn : std::nan("");  // mimics follow
-    }
+    for (std::size_t j = 0; j < joints.size(); ++j) q[j] = draw(joints[j], &random);
     kinematics.place_joints(q, &poses);
     const std::vector<std::size_t> group_of_body =
         groups_of_bodies(kinematics, is_not_drawn, &poses);

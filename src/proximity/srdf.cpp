@@ -62,7 +62,7 @@ CollisionRules read(const std::string& srdf_xml, const Kinematics* kinematics,
   Named unknown_elements, unknown_links;
   std::set<std::string> told;
   const auto link = [&](const tinyxml2::XMLElement& element, const char* attribute) {
-    const std::string name = link_of(element, attribute);
+    std::string name = link_of(element, attribute);
     const bool is_unknown = kinematics != nullptr && !kinematics->find_body(name);
     if (is_unknown && told.insert(name).second) {
       unknown_links.add("'" + name + "' in " + place_of(element));

@@ -54,6 +54,11 @@ void SurfacePairSearch::set_direction() {
   n_A_ = R_AB_ * n_B_;
 }
 
+// The part of a pair that is not divided, in the frame of the one that is: of A or not.
+ConvexPart SurfacePairSearch::other_part(const Pair& pair, bool of_a) const {
+  return of_a ? posed(b_.part(pair.b), X_AB_) : posed(a_.part(pair.a), X_BA_);
+}
+
 // The children of the larger box beside the smaller one: those that are wanted.
 // @param children  by bit, 0 for all
 SurfacePairSearch::Expansion SurfacePairSearch::expand(const Pair& pair, std::uint8_t children,
@@ -81,7 +86,7 @@ SurfacePairSearch::Expansion SurfacePairSearch::expand(const Pair& pair, std::ui
     double bound = std::max(static_cast<double>(bounds[k]) - rounding_, pair.bound);
     // A part may be much smaller than the box about it, as half of a rectangle is.
     if (other < 0 && bound < prune_bound && part_radius > static_cast<double>(node.radius[k])) {
-      if (!part) part = of_a ? posed(b_.part(pair.b), X_AB_) : posed(a_.part(pair.a), X_BA_);
+      if (!part) part = other_part(pair, of_a);
       bound = std::max(bound, child_bound(*part, node, static_cast<std::size_t>(k)) - rounding_);
     }
     if (bound > 0.0 && bound >= prune_bound) {

@@ -135,6 +135,7 @@ class SurfacePairSearch {
   void update_prune_bound();
   bool is_empty() const { return a_.empty() || b_.empty(); }
   bool is_leaf(const Pair& pair) const { return a_.child(pair.a) < 0 && b_.child(pair.b) < 0; }
+  ConvexPart other_part(const Pair& pair, bool of_a) const;
   Expansion expand(const Pair& pair, std::uint8_t children, double prune_bound);
   /// A number below 0 for boxes that overlap, which orders small ones first: they lead to an
   /// intersection soonest.

@@ -67,10 +67,11 @@ PyRows make_rows(const Robot& robot, const DoubleArray& q, const Distances& dist
   return {constraint_rows(*robot.model(), robot.kinematics(), span(q), answers, config), robot};
 }
 
-VelocityFilter make_filter(std::vector<double> speed, std::optional<std::vector<double>> lower,
-                           std::optional<std::vector<double>> upper,
-                           std::optional<std::vector<double>> acceleration,
-                           std::optional<std::vector<double>> weights, double period) {
+using OptionalVector = std::optional<std::vector<double>>;
+
+VelocityFilter make_filter(std::vector<double> speed, const OptionalVector& lower,
+                           const OptionalVector& upper, const OptionalVector& acceleration,
+                           const OptionalVector& weights, double period) {
   const std::vector<double> none;
   return VelocityFilter(
       {std::move(speed), lower.value_or(none), upper.value_or(none), acceleration.value_or(none)},
