@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Faults of a sensor: it stops, freezes, errs about the time, changes frame or layout."""
 
+import itertools
 import sys
 import time
 
@@ -108,25 +109,27 @@ class FaultsSensorTest(faults.FaultTest):
         for message in node.messages[begin + 30 : begin + 60]:
             self.assertEqual(message.status, ProximityArray.OK, message.status_text)
 
-    def test_two_sensors_on_one_topic(self):
-        """Each cloud would hide what the other sensor sees."""
-        X = pt.transform((0.2, -0.3, 0.1))
-        self.world.poses["other_camera"] = ("base", X)
+    def test_sensors_on_one_topic(self):
+        """Each cloud would hide what the other sensors see."""
+        frames = ["camera", "other_camera", "third_camera"]
+        X = [np.eye(4), pt.transform((0.2, -0.3, 0.1)), pt.transform((-0.2, 0.3, 0.1))]
+        for frame, X_camera in zip(frames[1:], X[1:]):
+            self.world.poses[frame] = ("base", X_camera)
         node = self.start()
-        count = [0]
+        turn = itertools.count()
 
-        def by_turns(message):
-            count[0] += 1
-            if count[0] % 2 == 0:
-                return message
+        def by_turns(message, sensors):
+            i = next(turn) % sensors
             z = np.frombuffer(message.data, "<f4")[2]
-            moved = pt.apply(pt.inverse(X), [[0, 0, z]])
-            return pt.cloud(moved, "other_camera", message.header.stamp)
+            moved = pt.apply(pt.inverse(X[i]), [[0, 0, z]])
+            return pt.cloud(moved, frames[i], message.header.stamp)
 
-        self.sensor.change = by_turns
-        node.wait_for_status(ProximityArray.STALE_CLOUD, "by turns in the frames")
-        self.sensor.change = None
-        node.wait_for_status(ProximityArray.OK)
+        for sensors in (2, 3):
+            with self.subTest(sensors):
+                self.sensor.change = lambda message, n=sensors: by_turns(message, n)
+                node.wait_for_status(ProximityArray.STALE_CLOUD, "by turns in the frames")
+                self.sensor.change = None
+                node.wait_for_status(ProximityArray.OK)
 
     def test_changes_layout(self):
         """To float64 of the other byte order, which is read; to clouds that no one can read."""

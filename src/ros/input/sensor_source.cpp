@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -199,18 +200,20 @@ std::string SensorSource::check(const Measurement& measurement) const {
   return target_.model || is_map_ ? "" : "it waits for the robot's model";
 }
 
-/// Each cloud takes the place of the one before, so that of two sensors only one would be seen at a
-/// time. A sensor that gets another frame keeps it for longer than the timeout, or 10 s.
+/// Each cloud takes the place of the one before, so that of several sensors only one would be seen
+/// at a time. A sensor that gets another frame keeps it for longer than the timeout, or 10 s.
 /// @returns empty, or why the messages of now cannot be used
 std::string SensorSource::note_frame(const std::string& frame) {
   const ros::Time now = ros::Time::now();
   const double longest = std::min(config_.timeout, 10.0);  // the timeout may be infinite
   if (frame != frame_) {
-    if (frame == frame_before_ && std::abs(seconds_between(frame_since_, now)) < longest) {
-      frames_alternate_until_ = now + ros::Duration(longest);
-    }
     frame_before_ = std::exchange(frame_, frame);
-    frame_since_ = now;
+    frames_left_[frame_before_] = now;
+    for (auto left = frames_left_.begin(); left != frames_left_.end();) {
+      const bool is_over = !(std::abs(seconds_between(left->second, now)) < longest);
+      left = is_over ? frames_left_.erase(left) : std::next(left);
+    }
+    if (frames_left_.count(frame) > 0) frames_alternate_until_ = now + ros::Duration(longest);
   }
   // The clock may have gone back.
   const double left = seconds_between(now, frames_alternate_until_);

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -88,7 +89,7 @@ class SensorSource : public Source {
   ros::Time in_use_;                  ///< stamp of the newest snapshot of this generation
   std::uint64_t content_ = 0;         ///< Measurement::content of the newest message
   std::string frame_, frame_before_;  ///< of the newest message, and another one before it
-  ros::Time frame_since_;             ///< when frame_ took the other's place
+  std::map<std::string, ros::Time> frames_left_;  ///< when another one took a frame's place
   ros::Time frames_alternate_until_;
   std::chrono::steady_clock::time_point target_since_;  ///< with this model and generation
   std::chrono::steady_clock::time_point waits_since_;   ///< nothing waited, or one was ingested
