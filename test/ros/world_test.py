@@ -216,6 +216,34 @@ class WorldTest(unittest.TestCase):
         self.send(replace_all=True)
         self.is_at_table()
 
+    def test_4_an_older_shape_is_not_the_newer_one(self):
+        """Moving an object ended the fault that its newer shape could not be used."""
+        broken = box("part", 0.0, 0.5)
+        broken.shape, broken.dimensions, broken.mesh = WorldObject.MESH, [], "/no/such/part.stl"
+        for bad, words in ((broken, "part.stl"), (box("part", 0.0, edge=2e4), "'part'")):
+            self.send(box("part", 0.0, 0.5))
+            self.is_at_table()
+            self.send(bad)
+            self.node.wait_for_status(ProximityArray.NO_CLOUD, words)
+            self.send(box("part", 0.0, 0.4, operation=WorldObject.MOVE), box("next", 5.0))
+            self.node.wait_until(lambda: self.node.messages[-1].sources[1].points_used == 3, "both")
+            for message in self.node.next_messages(20):
+                self.assertEqual(message.status, ProximityArray.NO_CLOUD, message.status_text)
+            self.send(box("part", 0.0, 0.35))
+            self.ball(lambda l: abs(l.distance - 0.15) < 1e-6, "the part with a shape that is used")
+            self.send(replace_all=True)
+            self.is_at_table()
+        # A move that cannot be done says nothing of the shape.
+        self.send(box("part", 0.0, 0.5))
+        upright = box("part", 0.0, 0.5, operation=WorldObject.MOVE)
+        upright.pose.orientation.w = 0.0
+        self.send(upright)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "'part'")
+        self.send(box("part", 0.0, 0.35, operation=WorldObject.MOVE))
+        self.ball(lambda l: abs(l.distance - 0.15) < 1e-6, "the part that was moved")
+        self.send(replace_all=True)
+        self.is_at_table()
+
     def test_5_too_many_objects(self):
         self.send(*[box("object %d" % i, 5.0) for i in range(10001)])
         self.node.wait_for_status(

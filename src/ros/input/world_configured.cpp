@@ -48,7 +48,7 @@ void WorldSource::read_configured() {
       }
       objects.push_back(std::move(object));
     } catch (const ModelError& error) {
-      note_fault(object_fault(object.name), "object '" + object.name + "': " + error.what());
+      note_fault(shape_fault(object.name), "object '" + object.name + "': " + error.what());
     }
   }
   if (!config_.file.empty()) {
@@ -101,7 +101,7 @@ void WorldSource::read_robot() {
     if (link.error.empty()) {
       links.push_back(std::move(object));
     } else {
-      note_fault(object_fault(object.name), "the other robot's " + link.error);
+      note_fault(shape_fault(object.name), "the other robot's " + link.error);
     }
   }
   add(Kind::kRobot, links);
@@ -146,7 +146,7 @@ void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objec
   for (const WorldObject& object : objects) {
     const bool is_twice = builder_.contains(object.name) || !names.insert(object.name).second;
     if (what != Kind::kMessage && is_twice) {
-      note_fault(object_fault(object.name),
+      note_fault(shape_fault(object.name),
                  "object '" + printable(object.name) +
                      "' is stated twice, by parameters, the file or the other robot; "
                      "names must be unique in a source");
@@ -154,14 +154,14 @@ void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objec
     }
     complete.push_back(object);
     complete.back().frame = frame_or_fixed(object.frame);
-    faults_.erase(object_fault(object.name));
+    forget_faults(object.name);
     for (const auto& [link, name] : config_.world.allowed_contacts) {
       if (name == object.name) complete.back().allowed_links.push_back(link);
     }
   }
   const std::vector<WorldFault> faults = builder_.add(complete, cancelled_);
   for (const WorldFault& fault : faults) {
-    note_fault(fault.object.empty() ? fault_of(what) : object_fault(fault.object), fault.text);
+    note_fault(fault.object.empty() ? fault_of(what) : shape_fault(fault.object), fault.text);
   }
   is_changed_ = true;
   show_faults();

@@ -19,10 +19,11 @@ enum class WorldFaultKind {
   kWork,        ///< the source's thread: until it succeeds
   kMany,        ///< more faults than are kept: until all objects are replaced
   kClash,       ///< a mirror's object with the name of a configured one
+  kShape,       ///< an object's last description: until another one is used
   kObject       ///< an object
 };
 
-/// A kind of fault and, of kClash and kObject, the object's name. Names come from outside, so they
+/// A kind of fault and, from kClash on, the object's name. Names come from outside, so they
 /// are no keys by themselves.
 using WorldFaultKey = std::pair<WorldFaultKind, std::string>;
 
@@ -32,6 +33,7 @@ using WorldFaults = std::map<WorldFaultKey, std::string>;
 inline WorldFaultKey object_fault(const std::string& name) {
   return {WorldFaultKind::kObject, name};
 }
+inline WorldFaultKey shape_fault(const std::string& name) { return {WorldFaultKind::kShape, name}; }
 inline WorldFaultKey fault_of(WorldFaultKind kind) { return {kind, ""}; }
 
 /// Decides which faults are logged: each sentence once a minute, and no more than kMost of them. A

@@ -66,12 +66,12 @@ void WorldSource::replace_from_topic(const std::function<void()>& change) {
   WorldFaults faults = faults_;
   for (const std::string& name : from_topic_) {
     builder_.remove(name);
-    faults_.erase(object_fault(name));
+    forget_faults(name);
   }
   from_topic_.clear();
   faults_.erase(fault_of(Kind::kMany));
   faults_.erase(faults_.lower_bound(fault_of(Kind::kClash)),
-                faults_.lower_bound(fault_of(Kind::kObject)));
+                faults_.lower_bound(fault_of(Kind::kShape)));
   is_changed_ = true;
   change();
   const auto refused = faults_.find(fault_of(Kind::kMessage));
@@ -93,7 +93,12 @@ void WorldSource::change_all(const std::vector<ist_proximity::WorldObject>& obje
       // An older description that the message holds must not end the fault of this one.
       add(Kind::kMessage, std::exchange(added, {}));
       const bool is_clash = is_mirror_ && configured_.count(object.id) > 0;
-      note_fault({is_clash ? Kind::kClash : Kind::kObject, object.id},
+      // A shape that could not be used stays unknown where the older one is moved.
+      const bool is_move = object.operation == ist_proximity::WorldObject::MOVE;
+      note_fault({is_clash  ? Kind::kClash
+                  : is_move ? Kind::kObject
+                            : Kind::kShape,
+                  object.id},
                  "object '" + printable(object.id) + "': " + error.what());
     }
   }
@@ -128,7 +133,7 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
     if (is_mirror_ && configured_.count(message.id) > 0) return;
     builder_.remove(message.id);
     from_topic_.erase(message.id);
-    faults_.erase(object_fault(message.id));
+    forget_faults(message.id);
   } else if (message.operation == Message::MOVE) {
     const std::string fault =
         builder_.move(message.id, frame_of(message.header.frame_id), to_object_pose(message.pose));
@@ -138,6 +143,11 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
     throw ModelError("operation is " + std::to_string(message.operation) +
                      "; allowed is 0 (ADD), 1 (REMOVE), 2 (MOVE), 3 (APPEND)");
   }
+}
+
+void WorldSource::forget_faults(const std::string& name) {
+  faults_.erase(shape_fault(name));
+  faults_.erase(object_fault(name));
 }
 
 /// Gives the object that the message adds just before another shape.

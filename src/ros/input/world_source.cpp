@@ -80,7 +80,7 @@ void WorldSource::note_fault(const WorldFaultKey& key, const std::string& fault)
     ROS_ERROR_STREAM("source '" << config_.name << "': " << fault);
   }
   // Names that are never sent again would fill the memory.
-  const bool is_named = key.first == Kind::kObject || key.first == Kind::kClash;
+  const bool is_named = key.first >= Kind::kClash;
   if (is_named && faults_.size() >= config_.world.limits.max_objects && faults_.count(key) == 0) {
     faults_[fault_of(Kind::kMany)] = "more than " +
                                      std::to_string(config_.world.limits.max_objects) +

@@ -62,6 +62,7 @@ class WorldSource : public Source {
   std::string frame_of(const std::string& stated) const;
   void add(WorldFaultKind what, const std::vector<WorldObject>& objects);
   void note_fault(const WorldFaultKey& key, const std::string& fault);
+  void forget_faults(const std::string& name);
   void show_faults();
   void take_target();
   void publish();
