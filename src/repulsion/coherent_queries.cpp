@@ -15,7 +15,8 @@ constexpr double kQueryShare = 0.7;
 
 }  // namespace
 
-CoherentQueries::CoherentQueries(std::shared_ptr<const RobotModel> model, const QueryConfig& config)
+CoherentQueries::CoherentQueries(const std::shared_ptr<const RobotModel>& model,
+                                 const QueryConfig& config)
     : CoherentQueries(model, config, Repulsion(model)) {}
 
 CoherentQueries::CoherentQueries(std::shared_ptr<const RobotModel> model, const QueryConfig& config,

@@ -210,8 +210,7 @@ PackageFinder environment_package_finder() {
 PackageFinder file_package_finder(const std::string& urdf_file,
                                   const std::vector<std::string>& package_dirs) {
   const PackageFinder others = environment_package_finder();
-  const std::string folder =
-      urdf_file.empty() ? "" : fs::absolute(urdf_file).parent_path().string();
+  std::string folder = urdf_file.empty() ? "" : fs::absolute(urdf_file).parent_path().string();
   return [others, folder, package_dirs](const std::string& package) -> std::string {
     if (package.empty()) return folder;
     for (const std::string& dir : package_dirs) {

@@ -21,7 +21,7 @@ namespace ist {
 class CoherentQueries {
  public:
   /// @param model  not null
-  CoherentQueries(std::shared_ptr<const RobotModel> model, const QueryConfig& config);
+  CoherentQueries(const std::shared_ptr<const RobotModel>& model, const QueryConfig& config);
   /// @param repulsion  made with the model's packings: spares the choice of its spheres
   CoherentQueries(std::shared_ptr<const RobotModel> model, const QueryConfig& config,
                   Repulsion repulsion);

@@ -45,7 +45,11 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
                                 : memory_status(report, status->sources[parent].status);
     selected_.push_back(snapshot);
   }
+  take_obstacles(*status);
+}
 
+/// Sorts the snapshots that count into clouds and worlds.
+void CloudSelection::take_obstacles(const StatusInput& status) {
   clouds_.clear();
   cloud_sources_.clear();
   cloud_stands_still_.clear();
@@ -53,9 +57,9 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
   world_sources_.clear();
   surfaces_.reset();
   oldest_stamp_ = ros::Time();
-  const bool usable = clouds_usable(*status);
+  const bool usable = clouds_usable(status);
   for (std::size_t i = 0; i < selected_.size(); ++i) {
-    if (!usable || !is_obstacle(i, *status)) selected_[i] = nullptr;
+    if (!usable || !is_obstacle(i, status)) selected_[i] = nullptr;
     if (!selected_[i]) continue;
     if (selected_[i]->surfaces) {
       worlds_.push_back(&selected_[i]->world);
@@ -64,7 +68,7 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       if (!selected_[i]->cloud.boxes) continue;  // it has no octomap
     }
     add_clouds(*selected_[i], &clouds_);
-    const SourceReport& report = status->sources[i];
+    const SourceReport& report = status.sources[i];
     cloud_sources_.resize(clouds_.size(), static_cast<int>(i));
     cloud_stands_still_.resize(clouds_.size(),
                                report.is_file || report.is_memory || std::isinf(report.timeout));

@@ -64,6 +64,7 @@ class CloudSelection {
  private:
   const SourceSnapshot* newest(const CloudSources& sources, std::size_t source,
                                const SnapshotRequest& request, const StatusInput& status);
+  void take_obstacles(const StatusInput& status);
 
   const Reader reader_;
   std::vector<const SourceSnapshot*> selected_;
