@@ -42,8 +42,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     FUZZ_CHECK((fault == faults.end()) == builder.contains(object.name),
                "'%s' is neither there nor named, or both", object.name.c_str());
   }
+  const auto world = builder.world();
   std::size_t triangles = 0;
-  for (const ist::KnownWorld::Object& object : builder.world()->objects()) {
+  for (const ist::KnownWorld::Object& object : world->objects()) {
     for (const ist::GeometryElement& element : *object.geometry) {
       const auto* mesh = std::get_if<ist::TriangleMesh>(&element.shape);
       if (mesh != nullptr) triangles += mesh->triangles.size();
