@@ -79,7 +79,7 @@ class CommandFilter {
   /// The given velocities, by joint of the command.
   std::vector<double> filter(const JointCommand& command, ist_proximity::FilterState* state);
   std::string why_not(const JointCommand& command, const ros::Time& now) const;
-  std::string why_not(const PlacedAnswers& answers, const ros::Subscriber& subscriber,
+  std::string why_not(const PlacedAnswers& placed, const ros::Subscriber& subscriber,
                       const ros::Time& now) const;
   const FilterAnswer& run(const JointCommand& command, const ros::Time& now);
   bool is_twist_proven(const JointCommand& command, const std::vector<double>& velocity);

@@ -127,11 +127,7 @@ void SensorSource::receive(Measurement measurement) {
   if (problem.empty() && !is_map_) problem = note_frame(measurement.header.frame_id);
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
-  if (is_believed && ahead >= kToldSkew) {
-    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': its stamps are " << ahead
-                                              << " s ahead of the clock; their age counts from "
-                                                 "their receipt; compare the clocks");
-  }
+  if (is_believed) tell_skew(ahead);
   // A message that came later has an earlier stamp because the clock of its sender went back. Maps
   // come one by one, so that any earlier stamp says so. A message that is stale already does not
   // replace one that is not.
@@ -169,7 +165,17 @@ void SensorSource::receive(Measurement measurement) {
     ++report->unusable;
     waits_for_tf_ = false;
   });
-  if (!is_used) return;
+  if (is_used) keep(std::move(measurement));
+}
+
+void SensorSource::tell_skew(double ahead) const {
+  if (ahead < kToldSkew) return;
+  ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': its stamps are " << ahead
+                                            << " s ahead of the clock; their age counts from "
+                                               "their receipt; compare the clocks");
+}
+
+void SensorSource::keep(Measurement measurement) {
   auto kept = std::make_shared<const Measurement>(std::move(measurement));
   if (is_map_) {
     last_map_ = std::move(kept);
@@ -285,7 +291,7 @@ void SensorSource::use_map() {
 /// @returns empty on success, else a sentence
 std::string SensorSource::use(const Measurement& measurement) {
   Placement placement;
-  const std::string problem = find_poses(measurement, &placement);
+  std::string problem = find_poses(measurement, &placement);
   if (!problem.empty()) return problem;
   SourceSnapshot& snapshot = exchange_.writable();
   const bool is_shown = !is_map_ && filtered_.getNumSubscribers() > 0;

@@ -55,6 +55,8 @@ class SensorSource : public Source {
   void guard(const std::function<void()>& function);
   void take_target();
   void receive(Measurement measurement);
+  void tell_skew(double ahead) const;
+  void keep(Measurement measurement);
   std::string check(const Measurement& measurement) const;
   std::string note_frame(const std::string& frame);
   double went_back(const ros::Time& stamp) const;
