@@ -30,7 +30,7 @@ std::size_t beam_at(std::size_t instant, std::size_t beams, std::size_t instants
 }
 
 // Moves the ends of beams from the sensor's frame at their own time to that at the first beam's.
-// What is no end stays what to_points() makes of it.
+// Beams without an end stay what to_points() makes of them.
 // @returns [m] how far the sensor was from its first place
 double place_beams(const LaserScan& scan, const IngestConfig& ranges, const Placement& placement,
                    std::vector<double>* xyz) {

@@ -186,7 +186,7 @@ Wrench SelfProximity::penetration(std::size_t link, const LinkProximity& answer)
   return all;
 }
 
-/// What joints that are late may have moved comes off the bounds of the pairs that they part.
+/// Joints that are late may have moved: that comes off the bounds of the pairs that they part.
 void SelfProximity::measure(const LiveConfig& live) {
   late_joints_->update(pose_source_.get(), poses_.stamp, poses_.known);
   const std::vector<LinkPair>& pairs = query_->pairs();
