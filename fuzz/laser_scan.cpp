@@ -84,7 +84,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FUZZ_CHECK(scan.count > 0 && std::abs(scan.duration()) <= ist::kLongestScan, "%zu beams, %g s",
              scan.count, scan.duration());
   ist::ScanPoints points;
-  ist::to_points(scan, min_range, max_range, X_SE, &points);
+  std::vector<ist::SensorAtBeam> sensor(1);
+  if (scan.count > 1) sensor.push_back({scan.count - 1, X_SE});
+  ist::to_points(scan, min_range, max_range, sensor, &points);
   FUZZ_CHECK(points.raw().size() == scan.count, "%zu points for %zu beams", points.raw().size(),
              scan.count);
   for (std::size_t i = 0; i < scan.count; ++i) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -32,9 +33,9 @@ LaserScan scan_of(const std::vector<float>& ranges) {
 
 CloudSnapshot ingested(const LaserScan& scan, double min_range, double max_range,
                        const Eigen::Isometry3d& X_FS = Eigen::Isometry3d::Identity(),
-                       const Eigen::Isometry3d& X_FS_end = Eigen::Isometry3d::Identity()) {
+                       Span<const SensorAtBeam> sensor = {}) {
   ScanPoints points;
-  to_points(scan, min_range, max_range, X_FS.inverse() * X_FS_end, &points);
+  to_points(scan, min_range, max_range, sensor, &points);
   CloudSnapshot snapshot;
   Ingest(test::whole_cloud()).run(points.raw(), X_FS, {}, 0.0, &snapshot);
   return snapshot;
@@ -54,7 +55,7 @@ TEST(LaserScan, PointsLieAlongTheirBeams) {
   const std::vector<float> ranges = {1.0F, 2.0F, 0.5F};
   test::Rng rng(1);
   const Eigen::Isometry3d X_FS = test::random_pose(&rng, 3.0);
-  const auto points = by_beam(ingested(scan_of(ranges), 0.0, 5.0, X_FS, X_FS), 3);
+  const auto points = by_beam(ingested(scan_of(ranges), 0.0, 5.0, X_FS), 3);
   for (int i = 0; i < 3; ++i) {
     const double angle = -1.5 + 1.5 * i,
                  r = static_cast<double>(ranges[static_cast<std::size_t>(i)]);
@@ -81,34 +82,56 @@ TEST(LaserScan, CountsSpecialValues) {
   }
 }
 
-// A sensor on a moving arm scans a fixed wall, each beam from the sensor's pose at the beam's time.
+// A sensor on a moving arm scans a fixed wall, each beam from the sensor's pose at the beam's time:
+// from the first beam to the last one the arm changes its direction a few times.
 TEST(LaserScan, EachBeamAtItsOwnTime) {
   test::Rng rng(2);
   constexpr std::size_t kBeams = 200;
   for (int trial = 0; trial < 20; ++trial) {
     const Eigen::Isometry3d X_start = test::random_pose(&rng, 0.3);
-    Eigen::Isometry3d X_end = X_start * test::random_pose(&rng, 0.1);
-    const Eigen::AngleAxisd turn(test::uniform(&rng, -1, 1), Eigen::Vector3d::UnitZ());
-    X_end.linear() = X_start.linear() * turn.toRotationMatrix();
+    std::vector<SensorAtBeam> sensor;
+    std::vector<double> turns;
+    double moved = 0.0;
+    for (std::size_t beam = 0; beam < kBeams; beam += 1 + beam / 2) {
+      if (beam + 1 + beam / 2 >= kBeams) beam = kBeams - 1;
+      SensorAtBeam at;
+      at.beam = beam;
+      turns.push_back(beam == 0 ? 0.0 : test::uniform(&rng, -1, 1));
+      if (beam > 0) at.X_SB.translation() = test::random_pose(&rng, 0.1).translation();
+      at.X_SB.linear() =
+          Eigen::AngleAxisd(turns.back(), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      moved = std::max(moved, at.X_SB.translation().norm());
+      sensor.push_back(at);
+    }
     std::vector<float> ranges(kBeams);
     std::vector<Eigen::Vector3d> truth(kBeams);
-    for (std::size_t i = 0; i < kBeams; ++i) {
-      const double t = static_cast<double>(i) / (kBeams - 1), angle = -1.5 + 3.0 * t;
-      Eigen::Isometry3d X = X_start;
-      X.translation() += t * (X_end.translation() - X_start.translation());
+    for (std::size_t i = 0, k = 0; i < kBeams; ++i) {
+      if (i > sensor[k + 1].beam) ++k;
+      const SensorAtBeam &a = sensor[k], &b = sensor[k + 1];
+      const double t = static_cast<double>(i - a.beam) / static_cast<double>(b.beam - a.beam);
+      const double angle = -1.5 + 3.0 * static_cast<double>(i) / (kBeams - 1);
+      Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+      X.translation() = (1 - t) * a.X_SB.translation() + t * b.X_SB.translation();
       X.linear() =
-          X_start.linear() * Eigen::AngleAxisd(t * turn.angle(), turn.axis()).toRotationMatrix();
+          Eigen::AngleAxisd((1 - t) * turns[k] + t * turns[k + 1], Eigen::Vector3d::UnitZ())
+              .toRotationMatrix();
+      X = X_start * X;
       const double range = test::uniform(&rng, 0.2, 3.0);
       ranges[i] = static_cast<float>(range);
       truth[i] = X * Eigen::Vector3d(range * std::cos(angle), range * std::sin(angle), 0);
     }
     LaserScan scan = scan_of(ranges);
     scan.time_increment = 1e-4;
-    const auto points = by_beam(ingested(scan, 0.0, 5.0, X_start, X_end), kBeams);
+    ScanPoints placed;
+    to_points(scan, 0.0, 5.0, sensor, &placed);
+    EXPECT_EQ(placed.sensor_moved, moved);
+    const auto points = by_beam(ingested(scan, 0.0, 5.0, X_start, sensor), kBeams);
     for (std::size_t i = 0; i < kBeams; ++i) ASSERT_LT((points[i] - truth[i]).norm(), 1e-6);
     // The pose is the same for all beams when there is no time between them.
     scan.time_increment = 0.0;
-    const auto still = by_beam(ingested(scan, 0.0, 5.0, X_start, X_end), kBeams);
+    to_points(scan, 0.0, 5.0, sensor, &placed);
+    EXPECT_EQ(placed.sensor_moved, 0.0);
+    const auto still = by_beam(ingested(scan, 0.0, 5.0, X_start, sensor), kBeams);
     const double angle = 1.5, r = static_cast<double>(ranges.back());
     EXPECT_LT(
         (still.back() - X_start * Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), 0))
@@ -122,16 +145,18 @@ TEST(LaserScan, RangeLimitsApplyToTheBeam) {
   const std::vector<float> ranges(11, 1.0F);
   LaserScan scan = scan_of(ranges);
   scan.time_increment = 0.01;
-  Eigen::Isometry3d X_end = Eigen::Isometry3d::Identity();
-  X_end.translation().x() = 0.8;
-  EXPECT_EQ(ingested(scan, 0.9, 1.1, Eigen::Isometry3d::Identity(), X_end).counts.used, 11U);
+  SensorAtBeam first, last;
+  last.beam = 10;
+  last.X_SB.translation().x() = 0.8;
+  const auto snapshot = ingested(scan, 0.9, 1.1, Eigen::Isometry3d::Identity(), {first, last});
+  EXPECT_EQ(snapshot.counts.used, 11U);
 }
 
 TEST(LaserScan, SelfFilterKnowsTheRobotAtEveryInstant) {
   const auto model = test::make_model({Sphere{0.1}}, 0.005);
   const std::vector<float> ranges(101, 1.0F);  // a half circle about the sensor
   ScanPoints points;
-  to_points(scan_of(ranges), 0.0, 5.0, Eigen::Isometry3d::Identity(), &points);
+  to_points(scan_of(ranges), 0.0, 5.0, {}, &points);
   const auto robot_at = [&](double x, double y) {
     Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
     X_FL.translation() << x, y, 0.0;
@@ -164,7 +189,7 @@ TEST(LaserScan, SelfFilterComparesABeamWithTheRobotOfItsTime) {
   const auto model = test::make_model({Sphere{0.1}}, 0.005);
   const std::vector<float> ranges(101, 1.0F);
   ScanPoints points;
-  to_points(scan_of(ranges), 0.0, 5.0, Eigen::Isometry3d::Identity(), &points);
+  to_points(scan_of(ranges), 0.0, 5.0, {}, &points);
   IngestConfig config = test::whole_cloud();
   config.self_filter = true;
   Ingest ingest(config);

@@ -112,8 +112,7 @@ IngestCounts counts_of_scan(const std::vector<float>& ranges, const IngestConfig
   scan.count = ranges.size();
   EXPECT_EQ(check_scan(scan), "");
   ScanPoints points;
-  to_points(scan, config.min_range, config.max_range, Eigen::Isometry3d::Identity(), &points,
-            config.sensor_range);
+  to_points(scan, config.min_range, config.max_range, {}, &points, config.sensor_range);
   IngestConfig without_ranges = config;
   without_ranges.min_range = 0.0;
   without_ranges.max_range = std::numeric_limits<double>::infinity();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/geometry/span.h"
 
 namespace ist {
 
@@ -43,15 +44,23 @@ struct ScanLimits {
 /// safe.
 std::string check_scan(const LaserScan& scan, const ScanLimits& limits = {});
 
-/// A scan as points in the sensor's frame at the first beam.
-struct ScanPoints {
-  std::vector<double> xyz;  ///< [m] three coordinates a beam
-  double beam_angle = 0.0;  ///< [rad] between two beams
-  RawCloud raw() const;     ///< views xyz: one point a beam, in the scan's order
+/// Where the sensor was when a beam was measured.
+struct SensorAtBeam {
+  std::size_t beam = 0;  ///< from 0
+  /// The sensor's frame at that beam -> at the first one, rigid.
+  Eigen::Isometry3d X_SB = Eigen::Isometry3d::Identity();
 };
 
-/// Places each beam's end where it was measured: in the sensor's pose at the beam's own time,
-/// interpolated between the first beam's and the last one's.
+/// A scan as points in the sensor's frame at the first beam.
+struct ScanPoints {
+  std::vector<double> xyz;    ///< [m] three coordinates a beam
+  double beam_angle = 0.0;    ///< [rad] between two beams
+  double sensor_moved = 0.0;  ///< [m] the sensor's largest distance from its first place
+  RawCloud raw() const;       ///< views xyz: one point a beam, in the scan's order
+};
+
+/// Places each beam's end where it was measured: in the sensor's pose at that beam, interpolated
+/// between the poses that are given.
 ///
 /// REP 117: +inf means that nothing was there, and becomes an infinite point. So does a range above
 /// range_max by at most 1 m, which drivers wrote before that REP. A longer one is discarded, as
@@ -62,10 +71,12 @@ struct ScanPoints {
 /// distances from the sensor's place at the first beam, which are not ranges.
 /// @param scan  checked by check_scan
 /// @param min_range, max_range  [m] of the points to keep, bounds included
-/// @param X_SE  sensor's frame at the last beam -> at the first, rigid
+/// @param sensor  in the order of beams, from the first one to the last one; between two of them
+/// the
+///     sensor moves evenly. Empty, or all beams measured at once: it stands still
 /// @param sensor_range  [m] the most that the sensor can measure, beside its own range_max
 void to_points(const LaserScan& scan, double min_range, double max_range,
-               const Eigen::Isometry3d& X_SE, ScanPoints* points,
+               Span<const SensorAtBeam> sensor, ScanPoints* points,
                double sensor_range = std::numeric_limits<double>::infinity());
 
 }  // namespace ist

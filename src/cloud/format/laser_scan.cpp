@@ -1,6 +1,7 @@
 #include "ist_proximity/cloud/laser_scan.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -39,6 +40,27 @@ Beam judge(const LaserScan& scan, double range, const RangeLimits& limits) {
   if (range < limits.min) return Beam::kTooNear;
   return range > limits.max ? Beam::kTooFar : Beam::kHit;
 }
+
+// The sensor's poses, asked beam by beam.
+class SensorMotion {
+ public:
+  explicit SensorMotion(Span<const SensorAtBeam> poses) : poses_(poses) {}
+
+  // @param beam  not before that of the last call
+  // @returns a point that is given in the sensor's frame at this beam, in its frame at the first
+  Eigen::Vector3d place(std::size_t beam, const Eigen::Vector3d& p) {
+    if (poses_.size() < 2) return p;
+    while (next_ + 1 < poses_.size() && poses_[next_].beam < beam) ++next_;
+    const SensorAtBeam &a = poses_[next_ - 1], &b = poses_[next_];
+    const double t = static_cast<double>(beam - a.beam) / static_cast<double>(b.beam - a.beam);
+    const Eigen::Quaterniond q_SA(a.X_SB.linear()), q_SB(b.X_SB.linear());
+    return q_SA.slerp(t, q_SB) * p + (1.0 - t) * a.X_SB.translation() + t * b.X_SB.translation();
+  }
+
+ private:
+  Span<const SensorAtBeam> poses_;
+  std::size_t next_ = 1;  // the pose that the beam is before, or in
+};
 
 }  // namespace
 
@@ -89,14 +111,19 @@ RawCloud ScanPoints::raw() const {
 }
 
 void to_points(const LaserScan& scan, double min_range, double max_range,
-               const Eigen::Isometry3d& X_SE, ScanPoints* points, double sensor_range) {
+               Span<const SensorAtBeam> sensor, ScanPoints* points, double sensor_range) {
   const RangeLimits limits = {min_range, max_range, std::max(sensor_range, max_range)};
   points->beam_angle = std::abs(scan.angle_increment);
-  const bool moves = scan.count > 1 && scan.time_increment != 0.0;
-  const Eigen::Quaterniond q_SE(X_SE.linear());
+  if (scan.time_increment == 0.0) sensor = {};
+  assert(sensor.empty() ||
+         (sensor[0].beam == 0 && sensor[sensor.size() - 1].beam + 1 == scan.count));
+  points->sensor_moved = 0.0;
+  for (const SensorAtBeam& at : sensor) {
+    points->sensor_moved = std::max(points->sensor_moved, at.X_SB.translation().norm());
+  }
+  SensorMotion motion(sensor);
   points->xyz.resize(3 * scan.count);
   for (std::size_t i = 0; i < scan.count; ++i) {
-    const auto beam = static_cast<double>(i);
     const double range = static_cast<double>(scan.ranges[i]);
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     switch (judge(scan, range, limits)) {
@@ -115,11 +142,8 @@ void to_points(const LaserScan& scan, double min_range, double max_range,
         p.x() = kImplausible;
         break;
       case Beam::kHit: {
-        const double angle = scan.angle_min + beam * scan.angle_increment;
-        p = range * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
-        if (!moves) break;
-        const double t = beam / static_cast<double>(scan.count - 1);
-        p = Eigen::Quaterniond::Identity().slerp(t, q_SE) * p + t * X_SE.translation();
+        const double angle = scan.angle_min + static_cast<double>(i) * scan.angle_increment;
+        p = motion.place(i, range * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0));
       }
     }
     std::copy_n(p.data(), 3, points->xyz.begin() + static_cast<std::ptrdiff_t>(3 * i));

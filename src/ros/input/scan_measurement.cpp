@@ -29,31 +29,14 @@ std::size_t beam_at(std::size_t instant, std::size_t beams, std::size_t instants
   return instants > 1 ? (beams - 1) * instant / (instants - 1) : 0;
 }
 
-// Moves the ends of beams from the sensor's frame at their own time to that at the first beam's.
-// Beams without an end stay what to_points() makes of them.
-// @returns [m] how far the sensor was from its first place
-double place_beams(const LaserScan& scan, const IngestConfig& ranges, const Placement& placement,
-                   std::vector<double>* xyz) {
-  const auto& poses = placement.X_FS_at;
-  const double least = std::max(scan.range_min, ranges.min_range);
-  const double most = std::min(scan.range_max, ranges.max_range);
+std::vector<SensorAtBeam> sensor_by_beam(const Placement& placement, std::size_t beams) {
   const Eigen::Isometry3d X_SF = placement.X_FS.inverse();
-  double moved = 0.0;
-  for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
-    const Eigen::Isometry3d X_SA = X_SF * poses[i], X_SB = X_SF * poses[i + 1];
-    const Eigen::Quaterniond q_SA(X_SA.linear()), q_SB(X_SB.linear());
-    moved = std::max(moved, X_SB.translation().norm());
-    const std::size_t first = beam_at(i, scan.count, poses.size());
-    const std::size_t last = beam_at(i + 1, scan.count, poses.size());
-    for (std::size_t beam = i == 0 ? first : first + 1; beam <= last; ++beam) {
-      const auto range = static_cast<double>(scan.ranges[beam]);
-      if (!(range >= least && range <= most)) continue;
-      const double t = static_cast<double>(beam - first) / static_cast<double>(last - first);
-      Eigen::Map<Eigen::Vector3d> p(xyz->data() + 3 * beam);
-      p = q_SA.slerp(t, q_SB) * p + (1.0 - t) * X_SA.translation() + t * X_SB.translation();
-    }
+  const std::size_t instants = placement.X_FS_at.size();
+  std::vector<SensorAtBeam> sensor;
+  for (std::size_t i = 0; i < instants; ++i) {
+    sensor.push_back({beam_at(i, beams, instants), X_SF * placement.X_FS_at[i]});
   }
-  return moved;
+  return sensor;
 }
 
 // The robot's solids, each for the beams that were measured between the instants beside its own: a
@@ -99,12 +82,11 @@ Measurement read_scan(const sensor_msgs::LaserScanConstPtr& message, const Inges
   measurement.take_in = [message, scan, ranges, instants](const Placement& placement,
                                                           Ingest* ingest, CloudSnapshot* snapshot) {
     ScanPoints points;
-    to_points(scan, ranges.min_range, ranges.max_range, Eigen::Isometry3d::Identity(), &points,
-              ranges.sensor_range);
-    const double moved = place_beams(scan, ranges, placement, &points.xyz);
+    to_points(scan, ranges.min_range, ranges.max_range, sensor_by_beam(placement, scan.count),
+              &points, ranges.sensor_range);
     ingest->run(points.raw(), placement.X_FS, robot_by_beam(placement, scan.count, instants),
                 message->header.stamp.toSec(), snapshot, placement.paddings);
-    if (!snapshot->extent.is_zero()) snapshot->extent.allow_for(moved);
+    if (!snapshot->extent.is_zero()) snapshot->extent.allow_for(points.sensor_moved);
   };
   return measurement;
 }
