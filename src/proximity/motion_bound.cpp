@@ -48,10 +48,6 @@ double MotionBound::speed(Span<const Eigen::Isometry3d> X_FB) const {
   return speed;
 }
 
-double MotionBound::time_for(double distance, Span<const Eigen::Isometry3d> X_FB) const {
-  return time_within(distance, speed(X_FB));
-}
-
 double time_within(double distance, double speed) {
   if (!(speed > 0.0)) return std::numeric_limits<double>::infinity();
   return (1.0 - 1e-9) * distance / speed;

@@ -27,11 +27,6 @@ class MotionBound {
   MotionBound(const Kinematics& kinematics, const JointMotion& motion, std::size_t body,
               const Eigen::Vector3d& center, double radius, std::size_t ancestor = 0);
 
-  /// The time [s] during which no point of the body moves farther than `distance` [m]; +inf when
-  /// the body stands still.
-  /// @param X_FB  by body, now
-  double time_for(double distance, Span<const Eigen::Isometry3d> X_FB) const;
-
   /// [m/s] a: no point of the body is faster now. @param X_FB  by body, now
   double speed(Span<const Eigen::Isometry3d> X_FB) const;
 

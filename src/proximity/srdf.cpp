@@ -121,9 +121,4 @@ CollisionRules read_srdf(const std::string& srdf_xml, const Kinematics* kinemati
   }
 }
 
-NamePairs disabled_collisions(const std::string& srdf_xml) {
-  const CollisionRules rules = read_srdf(srdf_xml, nullptr);
-  return {rules.disabled.begin(), rules.disabled.end()};
-}
-
 }  // namespace ist

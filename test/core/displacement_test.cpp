@@ -25,19 +25,6 @@ const std::vector<TriangleMesh>& meshes() {
   return kMeshes;
 }
 
-TEST(Displacement, IsNoLessThanThatOfAPoint) {
-  test::Rng rng(31);
-  for (int trial = 0; trial < 1000; ++trial) {
-    const double size = std::pow(10.0, -9.0 + 0.012 * trial);
-    const Eigen::Vector3d p_A = test::random_vector(&rng, 1.0);
-    const Eigen::Vector3d step = test::random_vector(&rng, size), p_B = p_A + step;
-    EXPECT_GE(displacement(p_A, p_B), step.norm() - 1e-15 * (1.0 + size)) << size;
-    EXPECT_GE(displacement(p_A, p_B), (p_A - p_B).norm()) << size;
-    EXPECT_LE(displacement(p_A, p_B), (p_A - p_B).norm() + 1e-12 * (1.0 + size)) << size;
-    EXPECT_EQ(displacement(p_A, p_A), 0.0);
-  }
-}
-
 // The box is of the whole geometry and not of the spheres inside it alone.
 TEST(Displacement, BoxHasAllVertices) {
   for (const double max_error : {0.002, 0.02}) {

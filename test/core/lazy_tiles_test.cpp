@@ -4,10 +4,10 @@
 
 #include <limits>
 #include <memory>
+#include <thread>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/proximity/proximity_batch.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
@@ -109,15 +109,19 @@ TEST(LazyTiles, ThreadsGetTheSameAnswers) {
     ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
     QueryConfig config;
     config.tolerance = 0.0;
-    ProximityBatch batch(model, config, 3);
-    std::vector<std::vector<Eigen::Isometry3d>> poses(12, scene.X_FL);
-    std::vector<Eigen::Isometry3d> X_FL;
-    for (const auto& pose : poses) X_FL.insert(X_FL.end(), pose.begin(), pose.end());
-    std::vector<LinkProximity> links;
-    batch.run(X_FL, {true, true, true}, {&cloud}, &links);
-    if (first.empty()) first.assign(links.begin(), links.begin() + 3);
-    for (std::size_t i = 0; i < links.size(); ++i) {
-      ASSERT_NEAR(links[i].distance, first[i % 3].distance, 1e-12);
+    std::vector<std::vector<LinkProximity>> answers(3);
+    std::vector<std::thread> threads;
+    for (std::vector<LinkProximity>& links : answers) {
+      threads.emplace_back([&] {
+        ProximityQuery(model, config).run(scene.X_FL, {true, true, true}, {&cloud}, &links);
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    if (first.empty()) first = answers[0];
+    for (const std::vector<LinkProximity>& links : answers) {
+      for (std::size_t i = 0; i < links.size(); ++i) {
+        ASSERT_NEAR(links[i].distance, first[i].distance, 1e-12);
+      }
     }
   }
 }

@@ -7,7 +7,6 @@
 #include <limits>
 #include <vector>
 
-#include "ist_proximity/proximity/proximity_batch.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/sanitizers.h"
@@ -98,46 +97,6 @@ TEST(RobotMinimum, ReportsUnknownLinks) {
   query.run_minimum(X_FL, {true, true}, {&nothing}, &robot);
   EXPECT_EQ(robot.nearest.state, LinkState::kClear);
   EXPECT_EQ(robot.link, -1);
-}
-
-TEST(ProximityBatch, EqualsOneQueryPerConfiguration) {
-  test::Rng rng(33);
-  const auto model = model_of(link_meshes());
-  const std::size_t links = model->links.size();
-  QueryConfig config;
-  config.tolerance = 0.0;
-  const CloudSnapshot cloud = test::make_snapshot(random_points(&rng, 500));
-  std::vector<bool> known(links, true);
-  known[1] = false;
-  for (const std::size_t count : {0, 1, 7, 50}) {
-    std::vector<Eigen::Isometry3d> X_FL;
-    for (std::size_t k = 0; k < count; ++k) {
-      for (const Eigen::Isometry3d& X : random_poses(&rng, links)) X_FL.push_back(X);
-    }
-    for (const int threads : {1, 2, 5}) {
-      ProximityBatch batch(model, config, threads);
-      std::vector<LinkProximity> results, one;
-      std::vector<RobotProximity> minima;
-      ASSERT_TRUE(batch.run(X_FL, known, {&cloud}, &results));
-      ASSERT_TRUE(batch.run_minimum(X_FL, known, {&cloud}, &minima));
-      ASSERT_EQ(results.size(), X_FL.size());
-      ASSERT_EQ(minima.size(), count);
-      for (std::size_t k = 0; k < count; ++k) {
-        const auto first = X_FL.begin() + static_cast<std::ptrdiff_t>(k * links);
-        const std::vector<Eigen::Isometry3d> X(first, first + static_cast<std::ptrdiff_t>(links));
-        ProximityQuery(model, config).run(X, known, {&cloud}, &one);
-        double least = std::numeric_limits<double>::infinity();
-        for (std::size_t i = 0; i < links; ++i) {
-          ASSERT_EQ(results[k * links + i].state, one[i].state);
-          if (one[i].state < LinkState::kNear) continue;
-          ASSERT_NEAR(results[k * links + i].distance, one[i].distance, 1e-9);
-          least = std::min(least, one[i].distance);
-        }
-        if (std::isinf(least)) continue;
-        ASSERT_NEAR(minima[k].nearest.distance, least, 1e-9);
-      }
-    }
-  }
 }
 
 }  // namespace

@@ -36,6 +36,11 @@ const char* const kRobot = R"(<robot name="r">
     <axis xyz="0 0 1"/><limit lower="0.25" upper="1" effort="1" velocity="1"/></joint>
 </robot>)";
 
+NamePairs disabled(const std::string& srdf_xml) {
+  const CollisionRules rules = read_srdf(srdf_xml, nullptr);
+  return {rules.disabled.begin(), rules.disabled.end()};
+}
+
 struct Robot {
   RobotDescription description = parse_urdf(kRobot, GeometrySource::kCollision, {});
   std::shared_ptr<const RobotModel> model = build_robot_model(description, {});
@@ -195,7 +200,7 @@ TEST(SelfCollisionPairs, WritesAnSrdfThatIsReadAgain) {
   sampled[1].contacts = 3;  // base-tip
   const auto left = [&](bool never) {
     return robot.names(
-        robot.pairs(disabled_collisions(to_srdf(*robot.model, robot.kinematics, sampled, never))));
+        robot.pairs(disabled(to_srdf(*robot.model, robot.kinematics, sampled, never))));
   };
   const Names without_always = {"base-b", "base-tip"};
   EXPECT_EQ(left(false), without_always);
@@ -204,13 +209,13 @@ TEST(SelfCollisionPairs, WritesAnSrdfThatIsReadAgain) {
 
 TEST(SelfCollisionPairs, srdf) {
   const NamePairs expected = {{"a", "b"}, {"a", "c"}};
-  EXPECT_EQ(disabled_collisions("<robot name='r'><group name='g'/>"
-                                "<disable_collisions link1='a' link2='b' reason='Never'/>"
-                                "<disable_collisions link1='c' link2='a'/></robot>"),
+  EXPECT_EQ(disabled("<robot name='r'><group name='g'/>"
+                     "<disable_collisions link1='a' link2='b' reason='Never'/>"
+                     "<disable_collisions link1='c' link2='a'/></robot>"),
             expected);
-  EXPECT_THROW(disabled_collisions("<robot"), ModelError);
-  EXPECT_THROW(disabled_collisions("<other/>"), ModelError);
-  EXPECT_THROW(disabled_collisions("<robot><disable_collisions link1='a'/></robot>"), ModelError);
+  EXPECT_THROW(disabled("<robot"), ModelError);
+  EXPECT_THROW(disabled("<other/>"), ModelError);
+  EXPECT_THROW(disabled("<robot><disable_collisions link1='a'/></robot>"), ModelError);
 }
 
 // MoveIt's order: off by default, then enabled, then disabled.

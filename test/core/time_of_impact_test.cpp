@@ -340,7 +340,8 @@ TEST(MotionBound, noPointMovesFarther) {
     place_mimics(*arm.kinematics, &placed);
     const MotionBound bound(*arm.kinematics, placed, body, center, radius);
     const double distance = test::uniform(&rng, 0.01, 1.0);
-    const double time = std::min(bound.time_for(distance, X_FB), motion.joints.duration - start);
+    const double time =
+        std::min(time_within(distance, bound.speed(X_FB)), motion.joints.duration - start);
     for (const double share : {0.25, 0.5, 0.75, 1.0}) {
       const double moved =
           displacement(arm, motion, body, center, radius, start, start + share * time);

@@ -9,7 +9,6 @@
 #include <memory>
 #include <vector>
 
-#include "ist_proximity/proximity/proximity_batch.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
@@ -62,21 +61,6 @@ TEST(WrongSizes, LinksAreUnknown) {
   EXPECT_TRUE(is_unknown(answer));
   query.run(poses(kLinks), std::vector<bool>(kLinks, true), {&cloud}, &answers);
   EXPECT_EQ(answers[0].state, LinkState::kNear);
-}
-
-TEST(WrongSizes, ConfigurationsAreUnknown) {
-  const auto robot = model();
-  const CloudSnapshot cloud = test::make_snapshot({{0.5, 0.0, 0.0}});
-  ProximityBatch batch(robot, {}, 2);
-  std::vector<LinkProximity> answers;
-  batch.run(poses(3 * kLinks), std::vector<bool>(kLinks, true), {&cloud}, &answers);
-  batch.run(poses(3 * kLinks - 1), std::vector<bool>(kLinks, true), {&cloud}, &answers);
-  ASSERT_EQ(answers.size(), 3 * kLinks - 1);
-  EXPECT_EQ(answers[0].state, LinkState::kNear);
-  EXPECT_TRUE(is_unknown(answers[2 * kLinks]));
-  EXPECT_TRUE(is_unknown(answers[2 * kLinks + 1]));
-  batch.run(poses(3 * kLinks), std::vector<bool>(kLinks - 1, true), {&cloud}, &answers);
-  for (const LinkProximity& answer : answers) EXPECT_TRUE(is_unknown(answer));
 }
 
 TEST(WrongSizes, PairsAreUnknown) {

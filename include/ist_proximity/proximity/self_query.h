@@ -126,10 +126,6 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
                                          const std::vector<LinkPair>& pairs,
                                          const std::function<bool()>& cancelled = {});
 
-/// Reads the `<disable_collisions>` elements of an SRDF.
-/// @throws ModelError when the text is no SRDF
-NamePairs disabled_collisions(const std::string& srdf_xml);
-
 /// How pairs of links behave over random configurations.
 struct PairSampling {
   std::size_t configurations = 2000;  ///< drawn evenly between the joints' limits

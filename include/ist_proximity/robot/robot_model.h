@@ -96,15 +96,4 @@ struct AttachedObject {
 RobotDescription with_objects(const RobotDescription& robot,
                               const std::vector<AttachedObject>& objects);
 
-/// Builds one link of the model anew and copies the others: the same result as build_robot_model
-/// for the description, without packing everything.
-/// @param model   of a description that differs in that link only, built with `config`
-/// @param link    without geometry it is removed from the model, unless `config.links` names it
-/// @returns null when cancelled
-std::shared_ptr<const RobotModel> rebuild_link(const RobotModel& model,
-                                               const RobotDescription& description,
-                                               const std::string& link,
-                                               const RobotModelConfig& config,
-                                               const RobotModelCallbacks& callbacks = {});
-
 }  // namespace ist

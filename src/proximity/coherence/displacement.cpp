@@ -7,11 +7,6 @@
 
 namespace ist {
 
-double displacement(const Eigen::Vector3d& p_A, const Eigen::Vector3d& p_B) {
-  const double distance = (p_A - p_B).norm();
-  return distance == 0.0 ? 0.0 : distance + kLostInLength * (p_A.norm() + p_B.norm());
-}
-
 Eigen::AlignedBox3d bounding_box(const LinkModel& link) {
   Eigen::AlignedBox3d box;
   for (const SphereLeaf& leaf : link.tree.leaves()) {

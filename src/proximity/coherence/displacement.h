@@ -30,9 +30,6 @@ inline double after_displacement(double bound, double displacement) {
              : -std::numeric_limits<double>::infinity();
 }
 
-/// [m] How far a point is between two places, rounding included. NaN or infinite where either is.
-double displacement(const Eigen::Vector3d& p_A, const Eigen::Vector3d& p_B);
-
 /// The box of a link and of all that it encloses, in the link's frame [m].
 Eigen::AlignedBox3d bounding_box(const LinkModel& link);
 

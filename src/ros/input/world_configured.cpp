@@ -134,7 +134,7 @@ std::string WorldSource::read_description(RobotDescription* description) {
   placed.header.frame_id = base.empty() ? robot.tf_prefix + root : base;
   placed.child_frame_id = robot_prefix_ + root;
   placed.transform.rotation.w = 1.0;
-  const std::string fault = robot_buffer_.add(placed, robot_prefix_, true, ros::Time());
+  std::string fault = robot_buffer_.add(placed, robot_prefix_, true, ros::Time());
   if (fault.empty()) robot_joints_->set_kinematics(kinematics);
   return fault;
 }

@@ -164,6 +164,22 @@ std::string JointStateListener::why_unusable(const sensor_msgs::JointState& mess
                      ahead);
 }
 
+/// Keeps what a message states about a joint, and what is wrong with it.
+void JointStateListener::collect_joint(std::size_t j, double q, double velocity) {
+  const std::string& name = kinematics_->joints()[j].name;
+  if (place_[j] == kNowhere) {
+    place_[j] = stated_.size();
+    stated_.push_back({j, q, velocity, ""});
+    const std::string fault = why_not_a_position(kinematics_->joints()[j], q);
+    if (fault.empty()) return;
+    stated_.back().fault = "the position of joint '" + name + "' " + fault + " and is not used";
+  } else if (Stated& first = stated_[place_[j]]; first.fault.empty() && !(first.q == q)) {
+    first.fault =
+        "joint '" + name +
+        format_text("' is stated twice in a message, at %g and at %g: it is not used", first.q, q);
+  }
+}
+
 /// Finds the joints that a message states, each once, and what is wrong with them.
 /// @param complains  whether names that are no joints are reported
 void JointStateListener::collect(const sensor_msgs::JointState& message, bool complains) {
@@ -188,19 +204,7 @@ void JointStateListener::collect(const sensor_msgs::JointState& message, bool co
       }
       continue;
     }
-    if (place_[j] == kNowhere) {
-      place_[j] = stated_.size();
-      stated_.push_back({j, q, velocity, ""});
-      const std::string fault = why_not_a_position(joint, q);
-      if (!fault.empty()) {
-        stated_.back().fault =
-            "the position of joint '" + joint.name + "' " + fault + " and is not used";
-      }
-    } else if (Stated& first = stated_[place_[j]]; first.fault.empty() && !(first.q == q)) {
-      first.fault = "joint '" + joint.name +
-                    format_text("' is stated twice in a message, at %g and at %g: it is not used",
-                                first.q, q);
-    }
+    collect_joint(j, q, velocity);
   }
   if (unknowns == 0 || !complains) return;
   const std::string others =

@@ -119,6 +119,7 @@ class JointStateListener {
   bool use_message(const sensor_msgs::JointState& message, const std::string& publisher);
   std::string why_unusable(const sensor_msgs::JointState& message) const;
   void collect(const sensor_msgs::JointState& message, bool complains);
+  void collect_joint(std::size_t joint, double q, double velocity);
   void refuse(std::size_t joint, const std::string& reason);
   ros::Time counted_stamp(const ros::Time& stamp);
   void use(const Stated& stated, const ros::Time& stamp, const std::string& publisher);
