@@ -59,7 +59,7 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
 /// @param explained  as in with_cause()
 std::string look_up_newest(const TransformBuffer& buffer, const std::string& fixed,
                            const std::string& frame, const ros::Time& now, double max_age,
-                           Eigen::Isometry3d* X_FT, ros::Time* stamp = nullptr,
+                           Eigen::Isometry3d* X_FT, ros::Time* newest = nullptr,
                            bool* explained = nullptr);
 
 /// Adds to a sentence on a pose that is not known why transforms are refused, where they are.

@@ -77,9 +77,9 @@ std::string ZoneServices::set_zone(const SetZone::Request& request) {
   if (!model->robot) return "the robot's model is not there yet";
   try {
     const ZoneConfig zone = to_zone(request);
-    const std::string fault = zones_fault({zone});
+    std::string fault = zones_fault({zone});
     if (!fault.empty()) return fault;
-    const std::string unknown = unmonitored_name(zone.links, *model);
+    std::string unknown = unmonitored_name(zone.links, *model);
     if (!unknown.empty()) return unknown;
     Eigen::Isometry3d ignored;
     const std::string lost = look_up(buffer_, fixed_frame_of(*model, config_),
@@ -117,7 +117,7 @@ std::vector<std::string> ZoneServices::remarks() const {
   if (summary.empty() || !model->robot) return {};
   std::vector<std::string> texts = zones_.off(fixed_frame_of(*model, config_), now);
   for (const ZoneConfig& zone : config_.zones) {
-    const std::string unknown = unmonitored_name(zone.links, *model);
+    std::string unknown = unmonitored_name(zone.links, *model);
     if (!unknown.empty()) texts.push_back("~zones/" + zone.name + "/links: " + unknown);
   }
   const std::string without = without_effect();

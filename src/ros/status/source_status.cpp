@@ -167,7 +167,7 @@ Status source_status(const SourceReport& source, double now) {
                                    seconds(source.frozen_after) + " (~" + prefix_of(source) +
                                    "frozen_after): its driver repeats itself");
   }
-  const Status view = view_status(source);
+  Status view = view_status(source);
   if (!view.ok()) return view;
   if (!source.incomplete.empty()) return incomplete(source);
   return {ProximityArray::OK, ""};
