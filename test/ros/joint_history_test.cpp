@@ -50,6 +50,25 @@ TEST_F(JointHistoryTest, MeasuresVelocityUpToTheNewestPosition) {
   EXPECT_NEAR(history_.velocity(left_, 0.05), 0.3, 1e-6);
 }
 
+// Joints that are stated apart, one of them seldom: each has its own times.
+TEST_F(JointHistoryTest, StatesOfOthersAreNoneOfAJoint) {
+  const auto place = [](double t) { return 0.3 + 0.2 * t; };  // of "left", at 12.5 Hz
+  std::vector<double> q;
+  add("right", 0.0, 10.01, 10.01);
+  add("left", place(0.04), 10.04, 10.04);
+  EXPECT_FALSE(history_.at(ros::Time(10.02), &q)) << "\"left\" was stated later";
+  for (int k = 2; k <= 50; ++k) {
+    const double t = 0.01 * k;
+    add("right", 0.0, 10.0 + t, 10.0 + t);
+    if (k % 8 == 4) add("left", place(t), 10.0 + t, 10.0 + t);
+  }
+  for (double t = 0.05; t < 0.44; t += 0.013) {
+    ASSERT_TRUE(history_.at(ros::Time(10.0 + t), &q));
+    EXPECT_NEAR(q[left_], place(t), 1e-6) << t;
+  }
+  EXPECT_NEAR(history_.velocity(left_, 0.05), 0.2, 1e-6);
+}
+
 TEST_F(JointHistoryTest, TakesStampsThatAreAheadForPresentOnes) {
   add("left", 0.1, 10.8, 10.0);
   add("left", 0.2, 10.9, 10.1);

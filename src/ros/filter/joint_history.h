@@ -25,13 +25,13 @@ class JointHistory {
   /// Forgets everything: the clock has gone back.
   void clear();
 
-  /// The positions [rad, m] by joint of the kinematics at an instant, between messages by a
-  /// straight line; those of the newest message after it. A mimic joint that is not stated is NaN.
-  /// @returns false where the history does not reach back to the instant
+  /// The positions [rad, m] by joint of the kinematics at an instant, between those that are stated
+  /// of a joint by a straight line; the newest one after it. A joint that is not stated is NaN.
+  /// @returns false where the history of a joint does not reach back to the instant
   bool at(const ros::Time& stamp, std::vector<double>* q) const;
 
   /// The newest position [rad, m] of a joint; NaN: not known.
-  double newest(std::size_t joint) const { return q_[joint]; }
+  double newest(std::size_t joint) const;
 
   /// [rad/s, m/s] A joint's mean velocity over the last `window` [s] > 0 before its newest
   /// position, or a little longer. NaN where the history does not reach back so far.
@@ -47,13 +47,11 @@ class JointHistory {
  private:
   struct Sample {
     ros::Time stamp;
-    std::vector<double> q;
+    double q;  ///< [rad, m]
   };
 
   std::shared_ptr<const Kinematics> kinematics_;
-  std::vector<double> q_;         ///< newest, by joint
-  std::vector<ros::Time> stamp_;  ///< by joint
-  std::deque<Sample> samples_;    ///< in the order of their stamps
+  std::vector<std::deque<Sample>> samples_;  ///< by joint, in the order of their stamps
 };
 
 }  // namespace ist
