@@ -14,13 +14,23 @@ import genpy.dynamic
 import numpy as np
 import proximity_testing as pt
 import rospy
+from geometry_msgs.msg import Point, Pose, Quaternion
+from joint_states_test import joint_state
 from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
+
+from ist_proximity.srv import AttachObject, AttachObjectRequest
 
 VOXEL = 0.02
 DECAY = 4.0
 BALL = (1.5, 0.6, 0.0)
+# A ball that turns about the camera: its reach is known, and farther points are dropped.
+TURNING_BALL = """<robot name="turning"> <link name="base"/>
+  <link name="ball_link"><collision><origin xyz="0.6 0 0"/><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="turn" type="continuous"><parent link="base"/><child link="ball_link"/><axis xyz="0 0 1"/></joint>
+</robot>"""
 
 
 def patch(distance, half, step=0.008):
@@ -198,6 +208,44 @@ class MemoryTest(unittest.TestCase):
         for message in self.node.messages[first:]:
             self.assertEqual(self.ball(message).source, "cloud/memory")
             self.assertAlmostEqual(self.ball(message).distance, distance_to(FAR), delta=2 * VOXEL)
+
+    def attach_box(self, size, middle, angle=0.0):
+        """Attaches a box to the ball, turned about z."""
+        attach = rospy.ServiceProxy(self.node.name + "/attach_object", AttachObject)
+        attach.wait_for_service(pt.TIMEOUT)
+        pose = Pose(Point(*middle), Quaternion(z=np.sin(angle / 2), w=np.cos(angle / 2)))
+        box = AttachObjectRequest(name="box", link="ball_link", shape=AttachObjectRequest.BOX)
+        box.dimensions, box.pose = size, pose
+        answer = attach(box)
+        self.assertTrue(answer.success, answer.message)
+
+    # The robot reaches farther with an object than where it was remembered what is there.
+    def test_what_was_beyond_reach_is_not_known_within_it(self):
+        far, turn = patch(1.9, 0.12), 0.5
+        publisher = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
+        self.world.repeat(100, lambda: publisher.publish(joint_state({"turn": turn})))
+        self.world.points = far
+        memory = {"enabled": True, "decay": DECAY, "resolution": VOXEL}
+        self.node = pt.ProximityNode(
+            self.namespace,
+            dict(links=["ball_link"], max_distance=0.8, memory=memory, pose_source="joint_states"),
+            TURNING_BALL,
+        )
+        self.node.wait_for(self.is_clear, "the far patch out of reach")
+        self.remember(10)
+        self.world.points = patch(5.0, 0.12) * [-1, 1, 1]  # the camera turns to the wall behind it
+        self.node.wait_for(self.is_clear, "the wall behind the camera")
+        seen_last = max(stamp for stamp, points in self.world.clouds_sent if points is far)
+        end = pt.inverse(pt.transform(angle=turn))[:3, :3] @ [1.9, 0.0, 0.0]  # in the ball's frame
+        way = end - [0.6, 0.0, 0.0]
+        first = len(self.node.messages)
+        # It pierces the far patch.
+        self.attach_box([2.2, 0.05, 0.05], [0.6, 0, 0] + way / 2, np.arctan2(way[1], way[0]))
+        told = self.node.wait_for_status(ProximityArray.DEGRADED, "a memory was made for a smaller robot", start=first)
+        self.assertEqual(self.ball(told).state, LinkProximity.UNKNOWN)
+        begin = self.node.messages.index(told)
+        known = self.node.wait_for(self.is_clear, "all of what was remembered is forgotten", start=begin)
+        self.assertGreater((known.header.stamp - seen_last).to_sec(), DECAY - 0.1)
 
     # What was remembered is somewhere, and nobody knows where the robot is.
     def test_its_frame_is_lost(self):

@@ -23,9 +23,9 @@ constexpr double kUnknownShare = 0.2;
 constexpr double kLeastDeadline = 1e-9;  // [s] 0 would be none
 
 constexpr char kOutsideRegion[] =
-    "a link is farther out than the limits of prismatic joints allow and is near places where "
-    "points were dropped as outside the region of interest: obstacles there are not known; state "
-    "the true limits in the URDF";
+    "a link is near places where points were dropped as outside the region of interest: obstacles "
+    "there are not known; it is farther out than the limits of prismatic joints allow (state the "
+    "true ones in the URDF), or a memory was made for a smaller robot or ~query/margin";
 
 }  // namespace
 

@@ -111,6 +111,7 @@ void SourceMemory::change_frame(const std::string& before) {
               fixed_frame_ + "' now");
   }
   map_.clear();
+  region_since_ = kNever;
   body_.clear();
   body_noted_ = 0.0;
   links_.clear();
@@ -126,6 +127,7 @@ void SourceMemory::set_back(double step) {
   stamp_ -= step;
   told_next_.lost_until -= step;
   body_noted_ -= step;
+  region_since_ -= step;
   if (step > kShortStep) {
     map_.clear_free();
     body_.clear();
@@ -203,13 +205,28 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
   if (!cloud.cloud.counts.saw_enough(kMinMeasured)) {
     return fault + "too little of it was measured";
   }
-  map_.set_region(target.region);
+  note_region(target.region, cloud.cloud.stamp);
   read_memory_scan(measurement.points, cloud.cloud, cloud.cloud.X_FS, config_.ingest.min_range,
                    map_.config().max_range, &scan_, cloud.in_zones);
   map_.insert(scan_);
   stamp_ = cloud.cloud.stamp;
   note_body(placement, cloud.cloud.stamp);
   return "";
+}
+
+/// What was seen outside of a region was not remembered, and a larger one does not bring it back:
+/// it holds when all is forgotten that was remembered before.
+void SourceMemory::note_region(const RegionOfInterest& region, double stamp) {
+  map_.set_region(region);
+  const bool is_first = region_since_ == kNever;
+  if (is_first || region.radius != newest_region_.radius ||
+      region.center_F != newest_region_.center_F) {
+    newest_region_ = region;
+    region_since_ = stamp;
+  }
+  const double before = region_.radius - (region.center_F - region_.center_F).norm();
+  const bool is_whole = is_first || stamp - region_since_ > map_.config().decay;
+  region_ = {region.center_F, is_whole ? region.radius : std::clamp(before, 0.0, region.radius)};
 }
 
 /// The robot's own space is known: nothing else is there.
@@ -233,6 +250,7 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::make_snapshot(
   auto snapshot = std::make_shared<SourceSnapshot>();
   snapshot->cloud.boxes = index;
   snapshot->cloud.box_extent = extent_;
+  snapshot->cloud.region = region_;
   snapshot->cloud.counts.received = static_cast<std::uint32_t>(told_next_.counts.known);
   snapshot->cloud.counts.used = static_cast<std::uint32_t>(boxes.size());
   snapshot->cloud.stamp = cloud_stamp_.toSec();

@@ -3,6 +3,7 @@
 #include <ros/publisher.h>
 #include <ros/time.h>
 
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -91,12 +92,15 @@ class SourceMemory : public ObstacleSource {
   void read_file();
   void note_loss(const std::string& text);
   void hand_over();
+  void note_region(const RegionOfInterest& region, double stamp);
   void note_body(const Placement& placement, double stamp);
   std::shared_ptr<const SourceSnapshot> make_snapshot(void (MemoryMap::*find_boxes)(VoxelBoxes*)
                                                           const) const;
   void publish_when_due(const ros::Time& stamp);
   std::string shortage() const;
   std::string advice() const;
+
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
 
   const SourceConfig config_;
   const bool wants_body_;
@@ -107,6 +111,9 @@ class SourceMemory : public ObstacleSource {
   std::uint64_t generation_ = 0;
   double set_back_ = 0.0;  ///< [s] SourceTarget::set_back
   std::string fixed_frame_;
+  RegionOfInterest region_;  ///< in which all is remembered that has been seen
+  RegionOfInterest newest_region_;
+  double region_since_ = kNever;         ///< [s] the newest one is in use; kNever: there is none
   double body_noted_ = 0.0;              ///< [s]
   std::size_t lost_ = 0;                 ///< MemoryCounts::lost, as told
   ros::Time cloud_stamp_, counts_from_;  ///< of the last cloud
