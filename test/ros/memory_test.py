@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ist_proximity.srv import AttachObject, AttachObjectRequest
+from ist_proximity.srv import AttachObject, AttachObjectRequest, DetachObject
 
 VOXEL = 0.02
 DECAY = 4.0
@@ -318,6 +318,33 @@ class MemoryTest(unittest.TestCase):
         for ball in self.move_in_cone("obstacle"):
             self.assertEqual(ball.state, LinkProximity.NEAR)
             self.assertAlmostEqual(ball.lower_bound, ball.unseen_distance, places=9)
+
+    # The space that the robot took up is known. An object that it has let go of is still there.
+    def test_what_the_robot_lets_go_of_is_not_known(self):
+        self.world.points = patch(2.4, 0.72, 0.015)
+        self.world.stand(pt.transform((1.0, 0.15, 0.0)), pt.transform((0, 0, 5)))
+        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
+        self.start(memory=memory, unknown_space="obstacle", max_distance=2.0)
+        # From the side of the cone of half width 0.3 x on, where the camera does not look.
+        to_side = (0.3 - 0.15) / np.hypot(1.0, 0.3) - pt.BALL_RADIUS
+        near_side = lambda m: (  # noqa: E731
+            self.is_from("cloud")(m) and abs(self.ball(m).unseen_distance - to_side) < 2 * VOXEL
+        )
+        self.node.wait_for(near_side, "the side of what is seen")
+        self.attach_box([0.6, 0.3, 0.8], [0.0, 0.3, 0.0])
+        self.node.wait_for(
+            lambda m: self.is_from("cloud")(m) and self.ball(m).box_size.z > 0.7, "the box, attached"
+        )
+        self.remember(10)
+        first = len(self.node.messages)
+        detach = rospy.ServiceProxy(self.node.name + "/detach_object", DetachObject)
+        self.assertTrue(detach("box").success)
+        is_alone = lambda m: self.is_from("cloud")(m) and self.ball(m).box_size.z < 0.7  # noqa: E731
+        begin = self.node.messages.index(self.node.wait_for(is_alone, "the box, detached", start=first))
+        self.node.wait_for(near_side, "the side of what is seen, again", start=begin)
+        self.remember(10)
+        for message in self.node.messages[begin:]:
+            self.assertLess(self.ball(message).lower_bound, to_side + 2 * VOXEL)
 
     # The memory is in a frame in which the robot drives. No cloud comes while it does.
     def test_unknown_space_stands_still_while_the_robot_drives(self):

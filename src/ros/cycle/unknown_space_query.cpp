@@ -39,7 +39,7 @@ std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vec
   if (!is_only_reader_) held_ = watch_.share();
   const UnknownSnapshot* unknown = is_only_reader_ ? watch_.newest() : held_.get();
   std::string problem;
-  if (unknown != nullptr) problem = why_unusable(*unknown, fixed_frame, poses.stamp);
+  if (unknown != nullptr) problem = why_unusable(*unknown, *model_, fixed_frame, poses.stamp);
   if (unknown == nullptr || !problem.empty()) {
     know_nothing();
     return problem;

@@ -88,6 +88,11 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
 }
 
 void SourceMemory::begin_target(const SourceTarget& target) {
+  if (target.model != robot_) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (robot_ && target.model && !same_geometry(*robot_, *target.model)) forget_body();
+    robot_ = target.model;
+  }
   if (target.generation == generation_ && target.fixed_frame == fixed_frame_) return;
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::string frame_before = fixed_frame_;
@@ -112,9 +117,7 @@ void SourceMemory::change_frame(const std::string& before) {
   }
   map_.clear();
   region_since_ = kNever;
-  body_.clear();
-  body_noted_ = 0.0;
-  links_.clear();
+  forget_body();
   read_file();
 }
 
@@ -130,8 +133,7 @@ void SourceMemory::set_back(double step) {
   region_since_ -= step;
   if (step > kShortStep) {
     map_.clear_free();
-    body_.clear();
-    links_.clear();
+    forget_body();
   }
   const ros::Duration back(std::min(step, std::min(cloud_stamp_.toSec(), counts_from_.toSec())));
   cloud_stamp_ -= back;
@@ -227,6 +229,12 @@ void SourceMemory::note_region(const RegionOfInterest& region, double stamp) {
   const double before = region_.radius - (region.center_F - region_.center_F).norm();
   const bool is_whole = is_first || stamp - region_since_ > map_.config().decay;
   region_ = {region.center_F, is_whole ? region.radius : std::clamp(before, 0.0, region.radius)};
+}
+
+void SourceMemory::forget_body() {
+  body_.clear();
+  links_.clear();
+  body_noted_ = 0.0;
 }
 
 /// The robot's own space is known: nothing else is there.
@@ -329,7 +337,8 @@ bool SourceMemory::add_to(SeenSpace* seen, KnownSpace* known) {
   seen->add(body_);
   known->links = links_;
   known->stamp = stamp_;
-  known->frame = fixed_frame_;  // the thread of the source writes it under the same mutex
+  known->frame = fixed_frame_;  // the thread of the source writes both under the same mutex
+  known->robot = robot_;
   return true;
 }
 

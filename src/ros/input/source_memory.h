@@ -21,6 +21,7 @@ struct KnownSpace {
   VoxelBoxes links;    ///< [m] each holds a link as it was last noted, in the fixed frame
   double stamp = 0.0;  ///< [s] of the last cloud
   std::string frame;   ///< the fixed frame's name
+  std::shared_ptr<const RobotModel> robot;  ///< whose own space is known
 };
 
 /// The memory of one source (~memory) in the fixed frame: its clouds go into a MemoryMap in the
@@ -39,8 +40,10 @@ class SourceMemory : public ObstacleSource {
 
   // The source's thread only.
 
-  /// Takes another fixed frame or clock. When the clock is set back, obstacles stay, as old as they
-  /// are; free space does where that is less than a second. What lies in another frame is lost.
+  /// Takes another fixed frame, clock or robot. When the clock is set back, obstacles stay, as old
+  /// as they are; free space does where that is less than a second. What lies in another frame is
+  /// lost. Where another robot was, for example with an object that it has let go of, anything may
+  /// be.
   void begin_target(const SourceTarget& target);
 
   /// Takes a cloud that has just been ingested.
@@ -94,6 +97,7 @@ class SourceMemory : public ObstacleSource {
   void hand_over();
   void note_region(const RegionOfInterest& region, double stamp);
   void note_body(const Placement& placement, double stamp);
+  void forget_body();
   std::shared_ptr<const SourceSnapshot> make_snapshot(void (MemoryMap::*find_boxes)(VoxelBoxes*)
                                                           const) const;
   void publish_when_due(const ros::Time& stamp);
@@ -111,6 +115,7 @@ class SourceMemory : public ObstacleSource {
   std::uint64_t generation_ = 0;
   double set_back_ = 0.0;  ///< [s] SourceTarget::set_back
   std::string fixed_frame_;
+  std::shared_ptr<const RobotModel> robot_;
   RegionOfInterest region_;  ///< in which all is remembered that has been seen
   RegionOfInterest newest_region_;
   double region_since_ = kNever;         ///< [s] the newest one is in use; kNever: there is none

@@ -117,10 +117,13 @@ visualization_msgs::MarkerArray unseen_markers(const VoxelBoxes& boxes, const Vo
   return array;
 }
 
-std::string why_unusable(const UnknownSnapshot& unknown, const std::string& fixed_frame,
-                         const ros::Time& time) {
+std::string why_unusable(const UnknownSnapshot& unknown, const RobotModel& robot,
+                         const std::string& fixed_frame, const ros::Time& time) {
   if (unknown.frame != fixed_frame) {
     return "all space counts as unknown: the fixed frame is another one since it was seen";
+  }
+  if (!same_geometry(*unknown.robot, robot)) {
+    return "all space counts as unknown: the robot is another one since it was seen";
   }
   const double ahead = unknown.stamp - time.toSec();
   if (ahead <= kBeganAnew) return "";
@@ -155,11 +158,15 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
   for (const auto& memory : memories_) {
     KnownSpace known;
     if (!memory->add_to(&snapshot->seen, &known)) continue;
+    // One of them does not know yet of another robot or fixed frame.
+    if (any && !(known.frame == all.frame && same_geometry(*known.robot, *all.robot)))
+      return nullptr;
     any = true;
     for (const Eigen::AlignedBox3d& link : known.links) robot.extend(link);
     all.links.insert(all.links.end(), known.links.begin(), known.links.end());
     snapshot->stamp = std::max(snapshot->stamp, known.stamp);
     all.frame = known.frame;
+    all.robot = known.robot;
   }
   if (!any || robot.isEmpty()) return nullptr;
   double radius = 0.5 * robot.diagonal().norm() + range_ + kMotion;
@@ -170,6 +177,7 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
   auto index = std::make_shared<BoxIndex>();
   index->build(boxes);
   snapshot->frame = all.frame;
+  snapshot->robot = all.robot;
   snapshot->boxes = index;
   snapshot->center_F = robot.center();
   snapshot->radius = radius;

@@ -26,13 +26,14 @@ struct UnknownSnapshot {
   Eigen::Vector3d center_F = Eigen::Vector3d::Zero();  ///< [m] they fill a sphere about the robot
   double radius = 0.0;                                 ///< [m] of that sphere
   double stamp = 0.0;                                  ///< [s] of the newest cloud in it
+  std::shared_ptr<const RobotModel> robot;             ///< whose own space is known
   SeenSpace seen;
 };
 
 /// Says why all space counts as unknown at an instant, though some has been seen; empty: it does
 /// not.
-std::string why_unusable(const UnknownSnapshot& unknown, const std::string& fixed_frame,
-                         const ros::Time& time);
+std::string why_unusable(const UnknownSnapshot& unknown, const RobotModel& robot,
+                         const std::string& fixed_frame, const ros::Time& time);
 
 /// Joins what the memories of all sources know, a few times a second in a thread of its own, and
 /// makes boxes of the rest (~unknown_space). What becomes known in between counts as unknown still.
