@@ -218,6 +218,26 @@ class QueryTest(unittest.TestCase):
         answer = self.ask(NOW, {"turn": 1.0, "slide": 0.5}, times=[0.0, 1.0])
         self.assertTrue(np.isnan(answer.impact_times).all())
 
+    # What a state leaves out is where it was at the answer's stamp, however late tf is.
+    def test_what_is_left_out_is_of_the_stamp(self):
+        begin = rospy.Time.now().to_sec()
+        column = lambda t: pt.transform((0, 0, 0.5), angle=begin - t)  # noqa: E731: it turns
+        self.world.poses = {"column": ("base", column)}
+        for name, X in arm_poses(0.0, NOW["slide"]).items():
+            self.world.poses[name] = ("column", pt.inverse(pt.transform((0, 0, 0.5))) @ X)
+        tf = self.world.start_tf()
+        self.start()
+        self.node.wait_for_status(ProximityArray.OK)
+        for _ in range(5):
+            rospy.sleep(0.3)
+            tf.paused = True
+            rospy.sleep(0.25)
+            (result,) = self.ask({"slide": NOW["slide"]}).results
+            tf.paused = False
+            stamp = result.header.stamp
+            self.assertIn(stamp, self.world.tf_sent)
+            self.check(result, {"turn": begin - stamp.to_sec(), "slide": NOW["slide"]})
+
     def test_joint_states(self):
         self.start(pose_source="joint_states")
         self.node.wait_for(

@@ -1,5 +1,6 @@
 #include "ros/poses/stated_pose_source.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "ros/poses/position_limits.h"
@@ -48,24 +49,39 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   root_known_ = false;
   kinematics_->place_joints(q_, &joints_);
   if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
-  const std::string problem =
-      look_up_newest(buffer_, fixed_frame_, kinematics_->bodies()[0], now, timeout_, &X_FR_);
-  if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
-  root_known_ = true;
-
+  const auto& bodies = kinematics_->bodies();
   const auto& joints = kinematics_->joints();
+  ros::Time instant = now;  // the newest at which tf knows all that is left out
+  const auto look_up_latest = [&](const std::string& to, const std::string& from,
+                                  Eigen::Isometry3d* X) {
+    ros::Time stamp;
+    std::string problem = look_up_newest(buffer_, to, from, now, timeout_, X, &stamp);
+    if (problem.empty() && !stamp.isZero()) instant = std::min(instant, stamp);
+    return problem;
+  };
+  std::string problem = look_up_latest(fixed_frame_, bodies[0], &X_FR_);
+  if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
   std::vector<PoseProblem> joint_problems(joints.size());
+  std::vector<std::size_t> left_out;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints_.known[j]) continue;
-    const std::string why =
-        look_up_newest(buffer_, kinematics_->bodies()[joints[j].parent],
-                       kinematics_->bodies()[joints[j].child], now, timeout_, &joints_.X_PC[j]);
+    left_out.push_back(j);
+    joint_problems[j].text =
+        look_up_latest(bodies[joints[j].parent], bodies[joints[j].child], &joints_.X_PC[j]);
+  }
+  problem = ist::look_up(buffer_, fixed_frame_, bodies[0], instant, &X_FR_);
+  if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
+  root_known_ = true;
+  for (const std::size_t j : left_out) {
+    std::string& why = joint_problems[j].text;
+    const std::string &to = bodies[joints[j].parent], &from = bodies[joints[j].child];
+    if (why.empty()) why = ist::look_up(buffer_, to, from, instant, &joints_.X_PC[j]);
     joints_.known[j] = why.empty();
     if (!why.empty()) {
-      joint_problems[j].text =
-          "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
+      why.insert(0, "joint '" + joints[j].name + "' is not stated, and not known now: ");
     }
   }
+  poses->stamp = instant;
   place(joint_problems, poses);
 }
 

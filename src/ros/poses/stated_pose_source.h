@@ -12,7 +12,8 @@ namespace ist {
 
 /// Link poses of a configuration that a request states; the robot need not be in it. Joints that
 /// the request leaves out, planar and floating joints, and the pose of the root link in the fixed
-/// frame come from tf as they are now.
+/// frame come from tf as they are now: at the newest instant at which it knows them all, which is
+/// that of the poses.
 class StatedPoseSource : public KinematicPoseSource {
  public:
   StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const TransformBuffer& buffer,
