@@ -183,9 +183,11 @@ class LaunchFilesTest(unittest.TestCase):
         topic = "/servo_server/internal/collision_velocity_scale"
         for manager in ("", "some_manager"):
             arguments = ["speed_scale:=" + topic, "tool:=tool0", "manager:=" + manager]
+            arguments.append("proximity_speed_scale:=/near/speed_scale")
             (node,) = loaded("velocity_filter.launch", *arguments).nodes
             remaps = dict(tuple(pair) for pair in node.remap_args)
             self.assertEqual(remaps["~speed_scale"], topic)
+            self.assertEqual(remaps["proximity/speed_scale"], "/near/speed_scale")
             self.assertTrue(node.required)
         (node,) = loaded("velocity_filter.launch", "name:=near").nodes
         self.assertEqual(dict(map(tuple, node.remap_args))["~speed_scale"], "near/speed_scale")
