@@ -21,8 +21,8 @@ class LateJoints {
   /// @param boxes       by link of the robot; outlives this
   LateJoints(std::shared_ptr<const Kinematics> kinematics, const std::vector<LinkBox>& boxes);
 
-  /// [m] By link: how far its points may have moved since. Empty: no joint is late. Valid until the
-  /// next call.
+  /// [m] By link: how far its points may have moved from those positions until the instant. Empty:
+  /// no joint is late. Valid until the next call.
   /// @param source   after its look_up(); may be null
   /// @param instant  of the poses
   /// @param known    by link: whether it has a pose

@@ -71,14 +71,14 @@ class ProximityCycle {
   /// @param model  see is_refinement()
   void refine(const std::shared_ptr<const ModelState>& model);
 
-  /// Takes what is said of the model where its robot is the same: how far its loading is.
+  /// Takes how far loading is, and what is said of the model, where the robot stays the same.
   void set_problem(const ModelState& model);
 
   /// Makes the next answer's stamp not go back before this one, which another cycle gave.
   void continue_from(const ros::Time& stamp) { poses_.stamp = stamp; }
 
-  /// Whether the first answers with new clouds are made by the threads of their sources. The first
-  /// time that they are, allocates the memory of a query.
+  /// Sets whether the threads of sources make the first answers with their new clouds. The first
+  /// call that says so allocates the memory of a query.
   /// @param warm_up  outlives this; that of no other cycle. Null: they are not
   void set_warm_up(SceneWarmUp* warm_up);
 

@@ -69,7 +69,7 @@ std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vec
   return "";
 }
 
-/// The links may be inside something everywhere.
+/// Says that each link may be as deep inside unknown space as it is thick.
 void UnknownSpaceQuery::know_nothing() {
   for (std::size_t i = 0; i < answers_.size(); ++i) {
     answers_[i] = UnknownSpaceAnswer();

@@ -25,9 +25,9 @@
 
 namespace ist {
 
-/// The question to a source for its snapshot.
+/// What a cycle or service asks a source for.
 struct SnapshotRequest {
-  std::shared_ptr<const RobotModel> model;  ///< that it has to be made with
+  std::shared_ptr<const RobotModel> model;  ///< that the snapshot has to be made with
   ros::Time time;        ///< a map is placed where it is then, or else at the newest known instant
   double max_age = 0.0;  ///< [s] allowed age of that instant
 };
@@ -48,14 +48,14 @@ class ObstacleSource {
   /// the memory of its strings. Thread safe.
   virtual void report(SourceReport* report) = 0;
 
-  /// Whether it is what the source just before it in CloudSources remembers, with whose snapshots
-  /// its own come while those are fresh, as SourceSnapshot::memory.
+  /// Whether it is the memory of the source just before it in CloudSources. While that one is
+  /// fresh, its snapshots bring those of the memory along, as SourceSnapshot::memory.
   virtual bool is_memory() const { return false; }
 };
 
 using CloudSources = std::vector<std::shared_ptr<ObstacleSource>>;
 
-/// The number of the source whose memory a source is; its own, where it is none.
+/// The number of the source that a memory belongs to; of a source that is no memory, its own.
 inline std::size_t parent_of(const CloudSources& sources, std::size_t source) {
   return sources[source]->is_memory() ? source - 1 : source;
 }

@@ -35,8 +35,8 @@ struct SourceReport {
   bool required = true;
   double min_measured = 0.0;  ///< the share of the points that has to be measured
   double sensor_range = 0.0;  ///< [m] farther points are not believed
-  /// [s] Messages may hold the same bytes for so long, and the receipt of the first that held those
-  /// of the newest; NaN: not asked.
+  /// [s] For how long messages may hold the same bytes; and when the first message came that held
+  /// the newest one's. NaN: nobody asks.
   double frozen_after = std::numeric_limits<double>::infinity();
   double same_since = std::numeric_limits<double>::quiet_NaN();
   /// [m] Points this near to a link are taken for the robot, so obstacles in this skin are not
@@ -59,7 +59,7 @@ struct SourceReport {
   /// Newest stamp received, or its receipt where it was ahead of the clock, except for stamps far
   /// in the future; NaN: none.
   double newest = std::numeric_limits<double>::quiet_NaN();
-  /// [s] for which the present message has been read and ingested; 0: none is.
+  /// [s] since reading and ingesting the present message began; 0: there is none.
   double working = 0.0;
   double last_work = 0.0;       ///< [s] what reading and ingesting the last message took
   double warm_up_time = 0.0;    ///< [s] what its first answer took; 0: there was no warm-up

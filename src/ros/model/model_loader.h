@@ -29,8 +29,8 @@ class ModelLoader {
   ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh);
   ~ModelLoader() { stop(); }
 
-  /// Loads the model where that is due. It is called again and again by one thread, which it takes
-  /// as long as the model does.
+  /// Loads the model where that is due, and returns when that is done. One thread calls it again
+  /// and again.
   void load_when_due();
   /// Ends loading and packing, now and from now on.
   void stop() { stop_ = true; }

@@ -13,8 +13,8 @@
 namespace ist {
 namespace {
 
-// [s] A sample that is late by less than this is taken for one that comes in time: publishers on
-// one machine are. What is allowed here makes poses older than header.stamp says.
+// [s] A sample that is late by less than this is taken for one that comes in time, as publishers
+// on one machine may be so late. What is allowed here makes poses older than header.stamp says.
 constexpr double kLag = 0.05;
 
 constexpr double kStampResolution = 1e-3;  // [s]

@@ -72,11 +72,11 @@ class PoseSource {
                            BodyPoses* bodies) = 0;
 
   /// How fast the joints moved at the instant of the last look_up() [rad/s, m/s], by joint of the
-  /// kinematics: NaN where that is not known. Empty: of none it is.
+  /// kinematics: NaN where that is not known. Empty: it is known of none.
   virtual Span<const double> joint_velocities() const { return {}; }
 
   /// How far the joints may have moved from the positions of the last look_up() until its instant,
-  /// where those are older, by joint of the kinematics. Empty: none is.
+  /// where those are older, by joint of the kinematics. Empty: no position is older.
   virtual Span<const StoppingReach> joint_lags() const { return {}; }
 
   /// Whether the poses are of a configuration that the robot need not be in.

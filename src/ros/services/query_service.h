@@ -59,8 +59,8 @@ class QueryService {
 
   SelfQueryAnswer self_;
   std::vector<bool> chosen_;  ///< by monitored link
-  /// Memory of a large answer is until then returned to the system: roscpp frees it after
-  /// answer().
+  /// After a large answer, memory is returned to the system until then: roscpp frees the answer
+  /// after answer().
   std::chrono::steady_clock::time_point return_memory_until_, next_return_;
 };
 
