@@ -40,8 +40,8 @@ class SourceMemory : public ObstacleSource {
 
   // The source's thread only.
 
-  /// Takes another fixed frame, clock or robot. When the clock is set back, obstacles stay, and keep
-  /// their age; free space stays where the clock went back by less than a second. What lies in
+  /// Takes another fixed frame, clock or robot. When the clock is set back, obstacles stay, and
+  /// keep their age; free space stays where the clock went back by less than a second. What lies in
   /// another frame is lost. Where another robot was, for example with an object that it has let go
   /// of, anything may be.
   void begin_target(const SourceTarget& target);
