@@ -14,8 +14,8 @@
 namespace ist {
 
 /// A callback queue with a thread of its own. An exception in a callback is logged, and the thread
-/// goes on with the next one. Subscribers and services that use the queue must be
-/// shut down after stop().
+/// goes on with the next one. Subscribers and services that use the queue must be shut down after
+/// stop().
 class CallbackThread {
  public:
   CallbackThread() = default;

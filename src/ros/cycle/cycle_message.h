@@ -23,8 +23,7 @@ void fill_status(const StatusInput& input, const Status& status,
 /// Lists what is found of a model whose robot is known, or not yet.
 Findings model_findings(const ModelState& model);
 
-/// Fills the whole message while there is no model: MODEL_ERROR or LOADING, and every
-/// link UNKNOWN.
+/// Fills the whole message while there is no model: MODEL_ERROR or LOADING, and every link UNKNOWN.
 void fill_without_model(const ModelState& model, const ServerConfig& config, const ros::Time& now,
                         const CloudSources& sources, ist_proximity::ProximityArray* message,
                         CycleReport* report);

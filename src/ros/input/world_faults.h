@@ -23,8 +23,8 @@ enum class WorldFaultKind {
   kObject       ///< an object
 };
 
-/// A kind of fault and, from kClash on, the object's name. Names come from outside, so they
-/// are no keys by themselves.
+/// A kind of fault and, from kClash on, the object's name. Names come from outside, so they are no
+/// keys by themselves.
 using WorldFaultKey = std::pair<WorldFaultKind, std::string>;
 
 /// The faults of a known world, by subject. The world is not OK until there is none.

@@ -50,8 +50,8 @@ class ModelLoader {
   /// Makes an object a part of its link, or removes it again. The old model stays in use until the
   /// new one replaces it, which happens before the function returns. Attached objects survive
   /// reload() as long as their link does. attach() is cancelled by detach() of the same name, by
-  /// reload(), by end_changes() and after 30 s. detach() works at any time: a model
-  /// that is being loaded is loaded again without the object.
+  /// reload(), by end_changes() and after 30 s. detach() works at any time: a model that is being
+  /// loaded is loaded again without the object.
   /// @returns empty on success, else the reason; then nothing has changed
   std::string attach(const std::string& name, const ObjectReader& read);
   std::string detach(const std::string& name);

@@ -26,10 +26,10 @@
 
 namespace ist {
 
-/// Measures link against link: publishes ~self_proximity at 50 Hz of the wall clock,
-/// from a thread of its own. Pairs are left out when one joint or fixed joints alone connect them,
-/// when the SRDF disables them (CollisionRules), and when they are in contact at rest. Its links
-/// are the monitored ones, and then the paired ones.
+/// Measures link against link: publishes ~self_proximity at 50 Hz of the wall clock, from a thread
+/// of its own. Pairs are left out when one joint or fixed joints alone connect them, when the SRDF
+/// disables them (CollisionRules), and when they are in contact at rest. Its links are the
+/// monitored ones, and then the paired ones.
 class SelfProximity {
  public:
   /// @param loader, buffer  outlive this
