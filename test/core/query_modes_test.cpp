@@ -99,5 +99,32 @@ TEST(RobotMinimum, ReportsUnknownLinks) {
   EXPECT_EQ(robot.link, -1);
 }
 
+// A range of +inf has no end, and where there is nothing, nothing is found.
+TEST(ProximityQuery, RangeWithoutAnEnd) {
+  const auto model = model_of({test::box({0.2, 0.2, 0.2})});
+  QueryConfig config;
+  config.max_distance = std::numeric_limits<double>::infinity();
+  const std::vector<Eigen::Isometry3d> X_FL(1, Eigen::Isometry3d::Identity());
+  for (const double margin : {0.0, 0.5}) {
+    config.margin = margin;
+    ProximityQuery query(model, config);
+    const CloudSnapshot nothing = test::make_snapshot({});
+    std::vector<LinkProximity> results;
+    RobotProximity robot;
+    ASSERT_TRUE(query.run(X_FL, {true}, {&nothing}, &results));
+    EXPECT_EQ(results[0].state, LinkState::kClear);
+    ASSERT_TRUE(query.run_minimum(X_FL, {true}, {&nothing}, &robot));
+    EXPECT_EQ(robot.nearest.state, LinkState::kClear);
+    for (const double x : {0.3, 50.0, 1e6}) {
+      const CloudSnapshot cloud = test::make_snapshot({{x, 0, 0}});
+      ASSERT_TRUE(query.run(X_FL, {true}, {&cloud}, &results));
+      EXPECT_EQ(results[0].state, LinkState::kNear);
+      EXPECT_NEAR(results[0].distance, x - 0.1, 1e-6 * x);
+      EXPECT_LE(results[0].lower_bound, x - 0.1 - margin);
+      EXPECT_GE(results[0].lower_bound, x - 0.1 - margin - config.tolerance - 1e-6 * x);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ist

@@ -17,7 +17,7 @@ using TimePoint = std::chrono::steady_clock::time_point;
 
 /// How a query answers.
 struct QueryConfig {
-  /// [m] a link without an obstacle nearer than this is CLEAR; > 0.
+  /// [m] a link without an obstacle nearer than this is CLEAR; > 0, +inf for a range without end.
   double max_distance = 1.0;
   /// [m] largest `distance - lower_bound`; 0 asks for the exact distance. >= 0.
   double tolerance = 0.001;
