@@ -42,7 +42,7 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
       spheres_(private_nh),
       diagnostics_(nh, without_slash(private_nh.getNamespace()), config),
-      buffer_(ros::Duration(10.0)),
+      buffer_(ros::Duration(10.0), config.pose_timeout),
       zones_(buffer_, config.pose_timeout, config.zones),
       loader_(config, nh),
       live_(private_nh, config),

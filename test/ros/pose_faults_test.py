@@ -319,6 +319,38 @@ class PoseFaultsTest(unittest.TestCase):
         stand()
         node.wait_for_status(ProximityArray.OK)
 
+    def test_a_sensor_that_turns_while_tf_is_silent(self):
+        """tf2 interpolates its pose evenly over the silence, in which it stood still at first."""
+        begin = [np.inf]
+        eye = lambda t: pt.transform(angle=np.clip(t - begin[0], 0.0, 1.5))  # noqa: E731
+        self.world.stand(ball=pt.transform((1, 0, 0)), box=pt.transform((0, 5, 0)))
+        self.world.poses["eye"] = ("base", eye)
+        tf = self.world.start_tf()
+        obstacle = np.array([[1.0, 0.5, 0.0]])
+
+        def send():
+            stamp = rospy.Time.now()
+            seen = pt.apply(pt.inverse(eye(stamp.to_sec())), obstacle)
+            self.world.cloud_publisher.publish(pt.cloud(seen, "eye", stamp=stamp))
+
+        node = self.start(pt.urdf(), pose_source="tf", cloud_timeout=1.0)
+        self.clouds.stop()
+        self.world.repeat(3, send)
+        for _ in range(3):
+            node.wait_for_status(ProximityArray.OK)
+            tf.paused, begin[0] = True, rospy.Time.now().to_sec() + 0.5
+            rospy.sleep(1.5)
+            tf.paused, first = False, len(node.messages)
+            ok = node.wait_for_status(ProximityArray.OK, start=first)
+            node.wait_for(lambda m: m.cloud_stamp > ok.cloud_stamp, "the next cloud")
+            for message in node.messages[first:]:
+                ball = pt.link(message, "ball_link")
+                if ball.state != LinkProximity.UNKNOWN:
+                    # Where it begins and ends to turn, the transforms 20 ms apart are not on a line.
+                    self.assertAlmostEqual(ball.distance, 0.4, delta=0.01)
+            begin[0] = np.inf
+            node.wait_for(lambda m, last=ok.cloud_stamp: (m.cloud_stamp - last).to_sec() > 1.0, "it to stand")
+
     def test_rival_of_joint_states(self):
         node = self.start()
         self.start_joints(moving=False)

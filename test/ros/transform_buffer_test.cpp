@@ -334,5 +334,53 @@ TEST(TransformBuffer, onePublisherAfterAnotherIsNoDispute) {
   EXPECT_EQ(add("/b", turned), "");
 }
 
+// tf2 interpolates over any time. Where a publisher was silent for long, a frame that is elsewhere
+// afterwards may have been anywhere in between.
+TEST(TransformBuffer, inGapsOfWhatHasMovedNoPoseIsKnown) {
+  TransformBuffer buffer(ros::Duration(10.0), 0.5);
+  const auto connection = boost::make_shared<ros::M_string>();
+  const TransformPublisher a("/a", connection);
+  const auto add = [&](double stamp, double x) {
+    EXPECT_EQ(buffer.add(transform("base", "arm", stamp, x), a, false, ros::Time(stamp)), "");
+    EXPECT_EQ(buffer.add(transform("arm", "hand", stamp), a, false, ros::Time(stamp)), "");
+  };
+  Eigen::Isometry3d X;
+  const auto problem = [&](double time, const char* frame = "hand") {
+    std::string why;
+    const std::string found = look_up(buffer, "base", frame, ros::Time(time), &X);
+    EXPECT_EQ(is_known(buffer, "base", frame, ros::Time(time), &why), found.empty());
+    EXPECT_EQ(why, found);
+    return found;
+  };
+  for (int i = 0; i <= 4; ++i) add(100.0 + 0.4 * i, i);  // it moves, and is never silent for long
+  EXPECT_EQ(problem(101.0), "");
+  add(103.0, 4.0005);  // 1.4 s, in which it stands still
+  EXPECT_EQ(problem(102.0), "");
+  add(104.0, 5.0);
+  EXPECT_NE(problem(103.5).find("one to 'base' was silent for 1.00 s"), std::string::npos);
+  EXPECT_EQ(problem(103.0), "");
+  EXPECT_EQ(problem(104.0), "");
+  EXPECT_EQ(look_up(buffer, "arm", "hand", ros::Time(103.5), &X), "");
+
+  // What is newest of two frames may be in the gap of one.
+  buffer.add(transform("base", "camera", 103.9), "/b", false, ros::Time(104.0));
+  EXPECT_NE(look_up(buffer, "camera", "hand", ros::Time(), &X), "");
+  buffer.add(transform("base", "camera", 104.1), "/b", false, ros::Time(104.1));
+  EXPECT_EQ(look_up(buffer, "camera", "hand", ros::Time(), &X), "");
+
+  add(103.6, 4.9);  // late
+  EXPECT_NE(problem(103.5), "");
+  EXPECT_EQ(problem(103.8), "");
+  add(103.3, 4.5);
+  EXPECT_EQ(problem(103.5), "");
+
+  add(106.0, 9.0);
+  EXPECT_NE(problem(105.0), "");
+  buffer.clear();  // the clock has jumped back
+  add(95.0, 0.0);
+  add(95.4, 1.0);
+  EXPECT_EQ(problem(95.2), "");
+}
+
 }  // namespace
 }  // namespace ist

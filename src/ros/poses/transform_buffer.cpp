@@ -86,6 +86,7 @@ void TransformBuffer::forget_moving() {
       kept.refusal = record.refusal;
       kept.refused_until = record.refused_until;
     }
+    gaps_ -= record.gaps.size();
     record.statements.forget_moving();
     kept.is_static_in_tf = record.is_static_in_tf;
     kept.frozen = record.frozen;
@@ -167,6 +168,7 @@ std::string TransformBuffer::note(const geometry_msgs::TransformStamped& transfo
   if (is_static) return "";
   record->parent = without_slash(transform.header.frame_id);
   *is_new = publisher.has_connection ? stamp != record->newest : stamp > record->newest;
+  if (*is_new) note_gap(transform, record);
   if (stamp <= record->newest) return "";
   record->newest = stamp;
   record->received = now;
@@ -179,6 +181,13 @@ std::string TransformBuffer::note(const geometry_msgs::TransformStamped& transfo
     record->refusal.clear();
   }
   return "";
+}
+
+/// The caller holds mutex_.
+void TransformBuffer::note_gap(const geometry_msgs::TransformStamped& transform, Record* record) {
+  gaps_ -= record->gaps.size();
+  record->gaps.note(transform, longest_gap_, getCacheLength().toSec());
+  gaps_ += record->gaps.size();
 }
 
 /// Notes whether tf2 has a frame without time, and whether it moves all the same: what the URDF or
@@ -352,6 +361,23 @@ std::string TransformBuffer::dispute(const std::string& fixed, const std::string
     const std::string& dispute = record->statements.dispute();
     if (!dispute.empty()) return dispute;
     if (!record->frozen.empty()) return record->frozen;
+  }
+  return "";
+}
+
+std::string TransformBuffer::gap(const std::string& fixed, const std::string& frame,
+                                 const ros::Time& instant) const {
+  if (gaps_ == 0) return "";
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const Record* record : between(fixed, frame)) {
+    const TransformGaps::Gap* gap = record->gaps.find(instant);
+    if (gap == nullptr) continue;
+    return "no transform from '" + frame + "' to '" + fixed + "' at the time: one to '" +
+           record->parent +
+           format_text(
+               "' was silent for %.2f s and has moved meanwhile, allowed is %.2f s "
+               "(~pose_timeout)",
+               seconds_between(gap->begin, gap->end), longest_gap_);
   }
   return "";
 }

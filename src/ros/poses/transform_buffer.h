@@ -10,6 +10,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <limits>
 #include <mutex>
 #include <set>
 #include <string>
@@ -17,6 +18,7 @@
 #include <vector>
 
 #include "ros/poses/frame_statements.h"
+#include "ros/poses/transform_gaps.h"
 
 namespace ist {
 
@@ -33,8 +35,11 @@ namespace ist {
 /// in dispute until it is static again. Thread safe.
 class TransformBuffer : public tf2::BufferCore {
  public:
-  /// @param cache_time  how long transforms are kept
-  explicit TransformBuffer(const ros::Duration& cache_time) : tf2::BufferCore(cache_time) {}
+  /// @param cache_time   how long transforms are kept
+  /// @param longest_gap  [s] see gap()
+  explicit TransformBuffer(const ros::Duration& cache_time,
+                           double longest_gap = std::numeric_limits<double>::infinity())
+      : tf2::BufferCore(cache_time), longest_gap_(longest_gap) {}
 
   /// Takes what comes on /tf and /tf_static, in the thread of the node handle's callback queue.
   void subscribe(ros::NodeHandle nh);
@@ -83,6 +88,12 @@ class TransformBuffer : public tf2::BufferCore {
   /// empty where none is in dispute. It costs nothing while there is no dispute at all.
   std::string dispute(const std::string& fixed, const std::string& frame) const;
 
+  /// Says that a transform between two frames was silent about an instant for longer than the
+  /// longest gap, and has moved meanwhile; empty where none was. It costs nothing while there is no
+  /// such gap at all.
+  std::string gap(const std::string& fixed, const std::string& frame,
+                  const ros::Time& instant) const;
+
   /// The instant from which the age of a pose counts: its stamp, or the receipt of a transform
   /// between the two frames that was stamped ahead of the clock.
   ros::Time counts_from(const std::string& fixed, const std::string& frame,
@@ -102,6 +113,7 @@ class TransformBuffer : public tf2::BufferCore {
     Clock::time_point refused_until;  ///< the largest there is: of a static one, not sent again
     int good_since = 0;               ///< transforms of that publisher that were used since
     FrameStatements statements;
+    TransformGaps gaps;
     bool is_static_in_tf = false;  ///< tf2 has it without time, whatever comes later
     std::string frozen;            ///< a sentence: it moves all the same; empty: it does not
 
@@ -119,6 +131,7 @@ class TransformBuffer : public tf2::BufferCore {
                      const std::string& fault, bool is_static);
   template <typename Change>
   void change_statements(const Change& change, Record* record);
+  void note_gap(const geometry_msgs::TransformStamped& transform, Record* record);
   void note_turn(const geometry_msgs::TransformStamped& transform,
                  const TransformPublisher& publisher, bool is_static, Record* record);
   Record* find_or_make(const std::string& child);
@@ -127,6 +140,7 @@ class TransformBuffer : public tf2::BufferCore {
               std::vector<std::string>* way) const;
   std::vector<const Record*> between(const std::string& fixed, const std::string& frame) const;
 
+  const double longest_gap_;                         ///< [s]
   mutable std::mutex mutex_;                         // guards the members below
   std::unordered_map<std::string, Record> records_;  ///< by child frame, without a slash
   std::string last_refusal_;
@@ -134,6 +148,7 @@ class TransformBuffer : public tf2::BufferCore {
   std::atomic<Clock::time_point> refused_until_{Clock::time_point()};  ///< the last one
   bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
   std::atomic<std::size_t> disputes_{0};  ///< records with a dispute, and those that are frozen
+  std::atomic<std::size_t> gaps_{0};      ///< of all records
   ros::Time last_now_;
   std::set<std::string> ignored_;
 

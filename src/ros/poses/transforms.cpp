@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <utility>
 
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/frame_name.h"
@@ -29,13 +30,33 @@ std::string trimmed(std::string tf_error) {
   return tf_error;
 }
 
-}  // namespace
-
-std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
-                    const std::string& frame, const ros::Time& time, Eigen::Isometry3d* X_FT,
-                    ros::Time* stamp) {
+/// Whether tf2 has a pose at an instant, by interpolation where it is between two.
+bool can_interpolate(const TransformBuffer& buffer, const std::string& fixed,
+                     const std::string& frame, const ros::Time& time, std::string* problem) {
   if (has_slash(fixed) || has_slash(frame)) {
-    return look_up(buffer, without_slash(fixed), without_slash(frame), time, X_FT, stamp);
+    return can_interpolate(buffer, without_slash(fixed), without_slash(frame), time, problem);
+  }
+  if (frame == fixed) return true;
+  std::string error = buffer.dispute(fixed, frame);
+  if (!error.empty()) {
+    if (problem) *problem = error;
+    return false;
+  }
+  try {
+    if (buffer.canTransform(fixed, frame, time, problem ? &error : nullptr)) return true;
+  } catch (const std::exception& exception) {
+    error = exception.what();
+  }
+  if (problem) *problem = "no transform from '" + frame + "' to '" + fixed + "': " + trimmed(error);
+  return false;
+}
+
+/// Looks up such a pose, also in a gap.
+std::string interpolate(const TransformBuffer& buffer, const std::string& fixed,
+                        const std::string& frame, const ros::Time& time, Eigen::Isometry3d* X_FT,
+                        ros::Time* stamp = nullptr) {
+  if (has_slash(fixed) || has_slash(frame)) {
+    return interpolate(buffer, without_slash(fixed), without_slash(frame), time, X_FT, stamp);
   }
   if (frame == fixed) {  // tf2 would give the stamp of the fixed frame in its own parent
     X_FT->setIdentity();
@@ -44,7 +65,7 @@ std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
   }
   std::string problem;
   // An exception for each frame that tf does not know would cost more than this question.
-  if (!is_known(buffer, fixed, frame, time, &problem)) return problem;
+  if (!can_interpolate(buffer, fixed, frame, time, &problem)) return problem;
   geometry_msgs::TransformStamped transform;
   try {
     transform = buffer.lookupTransform(fixed, frame, time);
@@ -61,6 +82,21 @@ std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
   if (!fault.empty()) return "transform from '" + frame + "' to '" + fixed + "': " + fault;
   *X_FT = X;
   if (stamp) *stamp = transform.header.stamp;
+  return "";
+}
+
+}  // namespace
+
+std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
+                    const std::string& frame, const ros::Time& time, Eigen::Isometry3d* X_FT,
+                    ros::Time* stamp) {
+  ros::Time found;
+  Eigen::Isometry3d X;
+  std::string problem = interpolate(buffer, fixed, frame, time, &X, &found);
+  if (problem.empty()) problem = buffer.gap(fixed, frame, found);
+  if (!problem.empty()) return problem;
+  *X_FT = X;
+  if (stamp) *stamp = found;
   return "";
 }
 
@@ -100,7 +136,7 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
   while (lag->windows < Lag::kMostWindows && stamp.toSec() > lag->window) {
     Eigen::Isometry3d X;
     stamp -= ros::Duration(lag->window);
-    if (!look_up(buffer, fixed, frame, stamp, &X).empty()) break;
+    if (!interpolate(buffer, fixed, frame, stamp, &X).empty()) break;
     lag->moved[lag->windows++] = X_after * X.inverse();
     X_after = X;
   }
@@ -109,21 +145,10 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
 
 bool is_known(const TransformBuffer& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem) {
-  if (has_slash(fixed) || has_slash(frame)) {
-    return is_known(buffer, without_slash(fixed), without_slash(frame), time, problem);
-  }
-  if (frame == fixed) return true;
-  std::string error = buffer.dispute(fixed, frame);
-  if (!error.empty()) {
-    if (problem) *problem = error;
-    return false;
-  }
-  try {
-    if (buffer.canTransform(fixed, frame, time, problem ? &error : nullptr)) return true;
-  } catch (const std::exception& exception) {
-    error = exception.what();
-  }
-  if (problem) *problem = "no transform from '" + frame + "' to '" + fixed + "': " + trimmed(error);
+  if (!can_interpolate(buffer, fixed, frame, time, problem)) return false;
+  std::string gap = buffer.gap(fixed, frame, time);
+  if (gap.empty()) return true;
+  if (problem) *problem = std::move(gap);
   return false;
 }
 

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <geometry_msgs/TransformStamped.h>
+#include <ros/time.h>
+
+#include <cstddef>
+#include <vector>
+
+namespace ist {
+
+/// Where the transforms of a moving frame are so far apart in time that nobody knows its pose in
+/// between, which tf2 interpolates all the same: its publisher was silent, and the frame is
+/// elsewhere afterwards. Not thread safe.
+class TransformGaps {
+ public:
+  struct Gap {
+    ros::Time begin, end;  ///< stamps of the transforms about it
+  };
+
+  /// Notes a transform with a stamp; they come in any order.
+  /// @param longest  [s] what is farther apart is a gap
+  /// @param kept     [s] older gaps are forgotten
+  void note(const geometry_msgs::TransformStamped& transform, double longest, double kept);
+
+  /// The gap that holds an instant; null: none does.
+  const Gap* find(const ros::Time& instant) const;
+  std::size_t size() const { return gaps_.size(); }
+
+ private:
+  geometry_msgs::TransformStamped newest_;
+  std::vector<Gap> gaps_;
+};
+
+}  // namespace ist
