@@ -247,6 +247,33 @@ class TrajectoryTest(unittest.TestCase):
         contact = (told.contact - told.start).to_sec()
         self.assertTrue(touch - 0.02 < contact <= touch, contact)
 
+    # Obstacles stand still from now on, and are where they are now, not where tf saw them last.
+    def test_objects_in_late_frames_are_nearer(self):
+        late, speed, begin = 0.3, 0.3, rospy.Time.now().to_sec()
+        middle = lambda t: max(3.0 - speed * (t - begin), 0.9)  # noqa: E731: of the box, along x
+
+        def send():
+            stamp = rospy.Time.now() - rospy.Duration(late)
+            X = pt.transform((middle(stamp.to_sec()), 0, 0.5))
+            self.world.publish_transforms([pt.transform_message("base", "carriage", X, stamp)])
+
+        self.world.repeat(50, send)
+        box = {"shape": "box", "size": [0.1, 0.1, 0.1], "frame_id": "carriage"}
+        cell = {"type": "world", "objects": {"box": box}}
+        self.points = np.array([[0.0, 3.0, 0.5]])
+        self.start(sources={"cloud": {"topic": "cloud"}, "cell": cell}, max_distance=5.0)
+        self.send()
+        self.wait(lambda m: m.state == m.NONE, "its end", 0)
+        known = [m for m in self.heard if m.state in (m.CLEAR, m.CONTACT)]
+        self.assertGreater(len(known), 20)
+        for message in known:
+            stamp = message.header.stamp.to_sec()
+            room = middle(stamp) - 0.05 - pt.BALL_RADIUS - FAR  # at the end
+            if message.state == message.CLEAR:
+                self.assertLessEqual(message.lower_bound, room + 1e-3)
+            else:
+                self.assertLessEqual((message.contact - message.start).to_sec(), DURATION * (1 + room / FAR) + 0.01)
+
     def test_obstacles_come_while_the_robot_waits_and_brakes(self):
         speed, wait, deceleration = 0.1, 3.0, 0.4
         self.start(

@@ -79,6 +79,17 @@ void LateFrames::lower(double max_distance, std::vector<LinkProximity>* answers)
   }
 }
 
+double LateFrames::within(const Eigen::Vector3d& center, double radius) const {
+  double most = 0.0;
+  for (const Lag* lag : lags_) {
+    for (const Eigen::Isometry3d& moved : lag->moves()) {
+      const double there = (moved * center - center).norm() + turn_of(moved) * radius;
+      most = std::max(most, lag->age / lag->window * there);
+    }
+  }
+  return most;
+}
+
 std::string LateFrames::doubt(double tolerance) const {
   if (!latest_ || most_ <= tolerance) return "";
   return "the newest pose of frame '" + latest_->frame +

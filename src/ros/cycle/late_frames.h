@@ -41,6 +41,9 @@ class LateFrames {
   /// @param answers       by link
   void lower(double max_distance, std::vector<LinkProximity>* answers);
 
+  /// [m] How far obstacles within a sphere may have come since, to whatever link.
+  double within(const Eigen::Vector3d& center, double radius) const;
+
   /// Says so where lower() took more than `tolerance` [m] off; else empty.
   std::string doubt(double tolerance) const;
 

@@ -5,6 +5,7 @@
 #include <ros/time.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -89,6 +90,11 @@ class ProximityCycle {
   /// The known worlds of the last run(), likewise, and what they are measured with.
   Span<const PosedWorld* const> worlds() const { return selection_.worlds(); }
   const WorldAnswers& world_answers() const { return worlds_; }
+  /// [m] How far obstacles within a sphere may have come since their frames' poses of the last
+  /// run().
+  double late_obstacles(const Eigen::Vector3d& center_F, double radius) const {
+    return std::max(late_worlds_.within(center_F, radius), late_maps_.within(center_F, radius));
+  }
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
 

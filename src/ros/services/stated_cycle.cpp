@@ -1,5 +1,10 @@
 #include "ros/services/stated_cycle.h"
 
+#include <algorithm>
+
+#include "internal/geometry/limits.h"
+#include "ist_proximity/robot/link_poses.h"
+
 namespace ist {
 
 std::string StatedCycle::take_model() {
@@ -19,6 +24,7 @@ std::string StatedCycle::take_model() {
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
                                             CloudSelection::Reader::kOther, watch_);
+  reach_ = kinematic_reach(*model_->robot, *model_->kinematics);
   impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
   return "";
 }
@@ -33,7 +39,13 @@ std::string StatedCycle::run(const sensor_msgs::JointState& configuration, const
 }
 
 TimeOfImpact& StatedCycle::impacts(const QueryConfig& query) {
-  impacts_->set_config(query);
+  QueryConfig config = query;
+  const double radius = std::min(reach_ + config.max_distance, kMaxLength);
+  const double late = cycle_->late_obstacles(poses_->X_FR().translation(), radius);
+  // They stand still from now on, and where they are now is not known better.
+  config.margin += late;
+  config.max_distance = std::max(config.max_distance - late, 0.5 * config.max_distance);
+  impacts_->set_config(config);
   if (cycle_->has_worlds()) impacts_->set_surfaces(cycle_->world_answers().surfaces(), {});
   return *impacts_;
 }

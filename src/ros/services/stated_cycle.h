@@ -37,7 +37,8 @@ class StatedCycle {
   std::string run(const sensor_msgs::JointState& configuration, const LiveConfig& live,
                   ist_proximity::ProximityArray* result);
 
-  /// Makes times of impact ready for the obstacles of the last run().
+  /// Makes times of impact ready for the obstacles of the last run(). Those in late frames may have
+  /// come nearer meanwhile.
   TimeOfImpact& impacts(const QueryConfig& query);
   /// By link of the robot: whether a motion that begins at the last run() can be answered.
   std::vector<bool> measurable() const;
@@ -58,6 +59,7 @@ class StatedCycle {
   StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle
   std::unique_ptr<ProximityCycle> cycle_;
   std::unique_ptr<TimeOfImpact> impacts_;
+  double reach_ = 0.0;  ///< [m] of the robot
 };
 
 }  // namespace ist
