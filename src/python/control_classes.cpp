@@ -32,11 +32,17 @@ std::vector<LinkProximity> to_answers(const Distances& distances, std::size_t li
   const auto state = distances.state.cast<DoubleArray>();
   const auto bound = distances.lower_bound.cast<DoubleArray>();
   const auto distance = distances.distance.cast<DoubleArray>();
-  check_shape(state, 1, static_cast<py::ssize_t>(links),
-              "distances are those of one configuration, of each of the robot's links");
+  constexpr const char* kWhat =
+      "distances are those of one configuration, of each of the robot's links";
+  const auto count = static_cast<py::ssize_t>(links);
+  for (const DoubleArray* array : {&state, &bound, &distance}) check_shape(*array, 1, count, kWhat);
   const auto on_link = distances.p_FCl.cast<DoubleArray>();
   const auto on_obstacle = distances.p_FCo.cast<DoubleArray>();
   const auto direction = distances.direction.cast<DoubleArray>();
+  for (const DoubleArray* array : {&on_link, &on_obstacle, &direction}) {
+    check_shape(*array, 2, 3, kWhat);
+    if (array->shape(0) != count) throw py::value_error(kWhat);
+  }
   std::vector<LinkProximity> answers(links);
   for (std::size_t i = 0; i < links; ++i) {
     answers[i].state = static_cast<LinkState>(static_cast<int>(state.data()[i]));
@@ -53,10 +59,11 @@ Span<const double> span(const DoubleArray& array) {
   return {array.data(), static_cast<std::size_t>(array.size())};
 }
 
-PyRows make_rows(const Robot& robot, const DoubleArray& q, const Distances& distances,
+PyRows make_rows(const Robot& robot, const py::object& given, const Distances& distances,
                  double horizon, double margin, double stop_distance, double approach_time,
                  double retreat_speed, double escape_speed, double obstacle_speed, double age,
                  double blind_skin, double linear_error) {
+  const DoubleArray q = to_numbers(given, "q is an array of numbers");
   check_shape(q, 1, static_cast<py::ssize_t>(robot.joints().size()),
               "q has the shape (joints,), joints being the number of Robot.joints");
   const RowConfig config{horizon,      margin,         stop_distance, approach_time, retreat_speed,
@@ -78,8 +85,10 @@ VelocityFilter make_filter(std::vector<double> speed, const OptionalVector& lowe
       weights.value_or(none), period);
 }
 
-PyFilterAnswer run_filter(VelocityFilter* filter, const DoubleArray& command, const DoubleArray& q,
-                          const PyRows& rows, double time_limit) {
+PyFilterAnswer run_filter(VelocityFilter* filter, const py::object& given_command,
+                          const py::object& given_q, const PyRows& rows, double time_limit) {
+  const DoubleArray command = to_numbers(given_command, "the command is an array of numbers");
+  const DoubleArray q = to_numbers(given_q, "q is an array of numbers");
   PyFilterAnswer result;
   result.answer = filter->run(span(command), span(q), rows.rows, time_limit);
   result.text = describe(result.answer, rows.rows, *rows.robot.model());

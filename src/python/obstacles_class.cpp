@@ -43,6 +43,7 @@ Eigen::Isometry3d to_pose(const DoubleArray& X) {
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 4; ++column) pose(row, column) = X.at(row, column);
   }
+  check_last_row(pose.matrix(), "sensor_pose");
   if (!is_rigid(pose)) throw py::value_error("sensor_pose is not a rotation and a translation");
   return pose;
 }
@@ -125,7 +126,8 @@ py::array array_of_file(const std::string& path, Eigen::Isometry3d* X_QS) {
 py::array to_array(const py::object& points, Eigen::Isometry3d* X_QS) {
   if (is_path(points)) return array_of_file(to_path(points), X_QS);
   const bool is_message = py::hasattr(points, "fields") && py::hasattr(points, "point_step");
-  const py::array given = is_message ? array_of_message(points) : py::array::ensure(points);
+  const py::array given =
+      is_message ? array_of_message(points) : py::array::ensure(without_mask(points));
   const char kind = given ? given.dtype().kind() : '?';
   if (kind != 'f' && kind != 'i' && kind != 'u') {
     PyErr_Clear();
@@ -154,31 +156,37 @@ ObstaclesConfig config_of(const py::dict& arguments) {
   config.max_range = py::cast<double>(arguments["max_range"]);
   config.self_filter_padding = py::cast<double>(arguments["self_filter_padding"]);
   if (!extent.is_none()) config.extent = to_extent(extent);
-  if (!robot.is_none()) {
-    config.robot = py::cast<const Robot*>(robot);
-    const auto positions = py::cast<DoubleArray>(
-        q.is_none() ? py::object(DoubleArray(static_cast<py::ssize_t>(0))) : q);
-    check_shape(positions, 1, static_cast<py::ssize_t>(config.robot->joints().size()),
-                "q has one position for each of the robot's joints");
-    config.q.assign(positions.data(), positions.data() + positions.size());
+  if (robot.is_none()) return config;
+  if (!py::isinstance<Robot>(robot)) throw py::type_error("robot is a Robot");
+  config.robot = py::cast<const Robot*>(robot);
+  if (py::isinstance<py::dict>(q)) {
+    config.q = config.robot->configuration(to_positions(py::reinterpret_borrow<py::dict>(q)));
+    return config;
   }
+  const auto positions =
+      py::cast<DoubleArray>(q.is_none() ? py::object(DoubleArray(static_cast<py::ssize_t>(0))) : q);
+  check_shape(positions, 1, static_cast<py::ssize_t>(config.robot->joints().size()),
+              "q has one position for each of the robot's joints");
+  config.q.assign(positions.data(), positions.data() + positions.size());
   return config;
 }
 
-/// A copy that nobody else changes.
-py::object owned(const py::object& array) {
-  return array.is_none() ? array : py::module_::import("numpy").attr("array")(array);
+/// A copy that nobody else changes, of None, a dictionary or an array.
+py::object owned(const py::object& given, const char* what) {
+  if (given.is_none()) return given;
+  if (py::isinstance<py::dict>(given)) return given.attr("copy")();
+  return py::module_::import("numpy").attr("array")(to_numbers(given, what));
 }
 
 PyObstacles make(const py::object& points, const py::object& sensor_pose, double min_range,
                  double max_range, const py::object& robot, const py::object& q,
                  double self_filter_padding, const py::object& extent) {
   py::dict arguments;
-  arguments["sensor_pose"] = owned(sensor_pose);
+  arguments["sensor_pose"] = owned(sensor_pose, "sensor_pose is a (4, 4) matrix");
   arguments["min_range"] = min_range;
   arguments["max_range"] = max_range;
   arguments["robot"] = robot;
-  arguments["q"] = owned(q);
+  arguments["q"] = owned(q, "q is an array of numbers, or a dictionary by joint names");
   arguments["self_filter_padding"] = self_filter_padding;
   arguments["extent"] = extent;
   Eigen::Isometry3d X_QS = Eigen::Isometry3d::Identity();
@@ -189,6 +197,7 @@ PyObstacles make(const py::object& points, const py::object& sensor_pose, double
       return X_FS(static_cast<Eigen::Index>(k / 4), static_cast<Eigen::Index>(k % 4));
     });
   }
+  array.array.attr("setflags")(py::arg("write") = false);
   const ObstaclesConfig config = config_of(arguments);
   const Obstacles obstacles = [&] {
     const py::gil_scoped_release unlocked;

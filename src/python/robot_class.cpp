@@ -16,6 +16,7 @@
 #include "arrays.h"
 #include "ist_proximity/facade/robot.h"
 #include "obstacles_class.h"
+#include "query_arguments.h"
 #include "robot_measures.h"
 
 namespace ist::python {
@@ -49,7 +50,7 @@ Raises ModelError when the robot cannot be read or packed.)";
 
 constexpr const char* kQueryDoc =
     R"(obstacles: Obstacles.
-max_distance: [m] a link without an obstacle nearer than this is CLEAR.
+max_distance: [m] a link without an obstacle nearer than this is CLEAR; at most 1e10.
 tolerance: [m] largest distance - lower_bound; 0: exact.
 margin: [m] subtracted from every lower bound.
 relative_tolerance: tolerance as a share of the distance, where that is wider.
@@ -125,15 +126,11 @@ struct Configurations {
   Configurations(const Robot& robot, const py::object& q) {
     if (py::isinstance<py::dict>(q)) {
       const std::vector<double> one =
-          robot.configuration(py::cast<std::map<std::string, double>>(q));
+          robot.configuration(to_positions(py::reinterpret_borrow<py::dict>(q)));
       array = DoubleArray(static_cast<py::ssize_t>(one.size()), one.data());
       return;
     }
-    array = DoubleArray::ensure(q);
-    if (!array) {
-      PyErr_Clear();
-      throw py::type_error("q is an array of numbers, or a dictionary by joint names");
-    }
+    array = to_numbers(q, "q is an array of numbers, or a dictionary by joint names");
     const auto joints = static_cast<py::ssize_t>(robot.joints().size());
     if (array.ndim() != 1 && array.ndim() != 2) check_shape(array, 2, joints, kWhat);
     check_shape(array, array.ndim(), joints, kWhat);
@@ -163,6 +160,7 @@ struct Configurations {
 
 BatchConfig batch_config(double max_distance, double tolerance, double margin,
                          double relative_tolerance, double deadline, int threads) {
+  check_max_distance(max_distance, margin);
   BatchConfig config;
   config.query.max_distance = max_distance;
   config.query.tolerance = tolerance;
@@ -214,9 +212,10 @@ Nearest nearest(const Robot& robot, const py::object& q, const PyObstacles& obst
   return to_arrays(answers, configurations.shape);
 }
 
-Distances distances_at(const Robot& robot, const DoubleArray& poses, const PyObstacles& obstacles,
+Distances distances_at(const Robot& robot, const py::object& given, const PyObstacles& obstacles,
                        double max_distance, double tolerance, double margin,
                        double relative_tolerance, double deadline, int threads) {
+  const DoubleArray poses = to_numbers(given, "poses are an array of numbers");
   const auto links = static_cast<py::ssize_t>(robot.links().size());
   const py::ssize_t n = poses.ndim();
   const bool fits = (n == 3 || n == 4) && poses.shape(n - 3) == links && poses.shape(n - 2) == 4 &&
@@ -231,6 +230,7 @@ Distances distances_at(const Robot& robot, const DoubleArray& poses, const PyObs
   for (std::size_t i = 0; i < X_FL.size(); ++i) {
     X_FL[i].matrix() =
         Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(poses.data() + 16 * i);
+    check_last_row(X_FL[i].matrix(), "a pose");
   }
   const BatchConfig config =
       batch_config(max_distance, tolerance, margin, relative_tolerance, deadline, threads);
@@ -246,31 +246,43 @@ Distances distances_at(const Robot& robot, const DoubleArray& poses, const PyObs
   return to_arrays(answers, shape);
 }
 
-/// Rows of trajectory k out of an array (n, joints) or (m, n, joints); none for an empty array.
+/// Rows of trajectory k out of an array (n, joints) or (m, n, joints); none for an array that is
+/// left out.
 std::vector<std::vector<double>> rows_of(const DoubleArray& array, std::size_t k, std::size_t n,
                                          std::size_t joints) {
   std::vector<std::vector<double>> rows;
-  if (array.size() == 0) return rows;
+  if (array.ndim() == 1) return rows;
   const double* first = array.data() + k * n * joints;
   for (std::size_t i = 0; i < n; ++i)
     rows.emplace_back(first + i * joints, first + (i + 1) * joints);
   return rows;
 }
 
-py::dict clearance(const Robot& robot, const DoubleArray& times, const DoubleArray& positions,
-                   const PyObstacles& obstacles, const DoubleArray& velocities,
-                   const DoubleArray& accelerations, double max_distance, double margin,
-                   int threads) {
+/// Raises ValueError where an array is neither left out nor like the positions.
+void check_like(const DoubleArray& positions, const DoubleArray& array, const char* name) {
+  const bool is_left_out = array.ndim() == 1 && array.size() == 0;
+  if (is_left_out || to_string(array) == to_string(positions)) return;
+  throw py::value_error(std::string(name) + " have the shape of the positions, " +
+                        to_string(positions) + "; an array of shape " + to_string(array) +
+                        " was given");
+}
+
+py::dict clearance(const Robot& robot, const py::object& given_times,
+                   const py::object& given_positions, const PyObstacles& obstacles,
+                   const py::object& given_velocities, const py::object& given_accelerations,
+                   double max_distance, double margin, int threads) {
+  const DoubleArray times = to_numbers(given_times, "times are an array of numbers");
+  const DoubleArray positions = to_numbers(given_positions, "positions are an array of numbers");
+  const DoubleArray velocities = to_numbers(given_velocities, "velocities are an array of numbers");
+  const DoubleArray accelerations =
+      to_numbers(given_accelerations, "accelerations are an array of numbers");
   const bool is_many = positions.ndim() == 3;
   const auto joints = static_cast<py::ssize_t>(robot.joints().size());
   check_shape(positions, is_many ? 3 : 2, joints,
               "positions have the shape (n, joints) or (m, n, joints)");
+  check_like(positions, velocities, "velocities");
+  check_like(positions, accelerations, "accelerations");
   const py::ssize_t n = positions.shape(is_many ? 1 : 0), m = is_many ? positions.shape(0) : 1;
-  for (const DoubleArray* one : {&velocities, &accelerations}) {
-    if (one->size() != 0 && one->size() != positions.size()) {
-      throw py::value_error("velocities and accelerations have the shape of the positions");
-    }
-  }
   const bool fits = times.ndim() == 1
                         ? times.shape(0) == n
                         : times.ndim() == 2 && times.shape(0) == m && times.shape(1) == n;
@@ -435,7 +447,8 @@ velocities, accelerations: like positions, or none. Joints move straight between
 with velocities, along quintic ones with accelerations too.
 Returns a dictionary of arrays (links,) or (m, links): contact_time [s], never later than the first contact, inf without
 one, nan where it is not known; lower_bound [m] of the distance until the end or that time, at most the least distance and
-less by a quarter of it or 2 mm; nearest_time [s] of the least bound found; and gradient (links, joints) or (m, links,
+less by a quarter of it or 2 mm (more along a polynomial with a second derivative above 16 rad, with the time between
+two positions as its unit); nearest_time [s] of the least bound found; and gradient (links, joints) or (m, links,
 joints) of the distance then, [m/rad, 1] by Robot.joints, nan in contact or with nothing near.)");
   define_measures(&type);
 }

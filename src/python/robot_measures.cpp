@@ -10,6 +10,7 @@
 #include "internal/packing/packing_report.h"
 #include "ist_proximity/facade/cost.h"
 #include "obstacles_class.h"
+#include "query_arguments.h"
 
 namespace ist::python {
 namespace {
@@ -67,11 +68,13 @@ py::list measure_packing_of(const Robot& robot) {
   return links;
 }
 
-py::dict cycle_cost(const Robot& robot, const DoubleArray& q, const PyObstacles& obstacles,
+py::dict cycle_cost(const Robot& robot, const py::object& given, const PyObstacles& obstacles,
                     int per_cloud, double period, double max_distance, double tolerance,
                     double deadline, double influence_distance) {
+  const DoubleArray q = to_numbers(given, "q is an array of numbers");
   check_shape(q, 2, static_cast<py::ssize_t>(robot.joints().size()),
               "q has the shape (n, joints), joints being the number of Robot.joints");
+  check_max_distance(max_distance, 0.0);
   CycleConfig config;
   config.per_cloud = per_cloud;
   config.period = period;
