@@ -37,6 +37,8 @@ inline std::string to_path(const py::object& path) {
 /// A masked array of numbers with NaN where it is masked, since what lies below a mask is not
 /// known; anything else as it is.
 inline py::object without_mask(const py::object& given) {
+  const PyTypeObject* plain = py::detail::npy_api::get().PyArray_Type_;
+  if (!py::isinstance<py::array>(given) || Py_TYPE(given.ptr()) == plain) return given;  // sooner
   if (!py::isinstance(given, py::module_::import("numpy.ma").attr("MaskedArray"))) return given;
   const char kind = py::reinterpret_borrow<py::array>(given).dtype().kind();
   if (std::string("biuf").find(kind) == std::string::npos) return given;
