@@ -63,10 +63,7 @@ class LinkQuery {
   /// [m] The same for the obstacles without their extents.
   double proven_points_bound() const { return proven(link_.search.lower_bound()); }
   /// After run(): whether an obstacle was found in range, or its sphere.
-  bool is_in_range() const {
-    const bool is_near = distance() < kInfinity && distance() <= link_.search.range();
-    return is_near && !is_clear_of_extents();
-  }
+  bool is_in_range() const { return distance() <= link_.search.range() && !is_clear_of_extents(); }
   /// After run(): whether the clouds' regions of interest hold all that this link has to know.
   bool is_inside_regions() const {
     return link_.search.region_bound >= link_.search.config.max_distance +

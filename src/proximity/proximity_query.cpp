@@ -6,6 +6,7 @@
 #include "internal/geometry/numbers.h"
 #include "proximity/coherence/scene_tracker.h"
 #include "proximity/link_query.h"
+#include "proximity/within_reach.h"
 
 namespace ist {
 namespace {
@@ -31,7 +32,7 @@ void LinkProximity::reset() {
 
 struct ProximityQuery::Impl {
   Impl(std::shared_ptr<const RobotModel> robot, const QueryConfig& query_config)
-      : model(std::move(robot)), config(query_config) {
+      : model(std::move(robot)), config(within_reach(query_config)) {
     links.reserve(model->links.size());
     for (const LinkModel& link : model->links) links.emplace_back(link);
     order.reserve(links.size());
@@ -243,7 +244,7 @@ void ProximityQuery::set_model(std::shared_ptr<const RobotModel> model) {
   impl_->model = std::move(model);
 }
 
-void ProximityQuery::set_config(const QueryConfig& config) { impl_->config = config; }
+void ProximityQuery::set_config(const QueryConfig& config) { impl_->config = within_reach(config); }
 const QueryConfig& ProximityQuery::config() const { return impl_->config; }
 const QueryStatistics& ProximityQuery::statistics() const { return impl_->statistics; }
 const RobotModel& ProximityQuery::model() const { return *impl_->model; }

@@ -9,6 +9,7 @@
 #include "internal/proximity/deadline.h"
 #include "proximity/link_pair_query.h"
 #include "proximity/link_surface.h"
+#include "proximity/within_reach.h"
 
 namespace ist {
 namespace {
@@ -74,7 +75,7 @@ SelfQuery::SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPa
     : impl_(std::make_unique<Impl>()) {
   impl_->model = std::move(model);
   impl_->pairs = std::move(pairs);
-  impl_->config = config;
+  set_config(config);
   try {
     impl_->prepare(cancelled);
   } catch (const Cancelled&) {
@@ -86,7 +87,7 @@ SelfQuery::~SelfQuery() = default;
 SelfQuery::SelfQuery(SelfQuery&&) noexcept = default;
 SelfQuery& SelfQuery::operator=(SelfQuery&&) noexcept = default;
 
-void SelfQuery::set_config(const QueryConfig& config) { impl_->config = config; }
+void SelfQuery::set_config(const QueryConfig& config) { impl_->config = within_reach(config); }
 
 const std::vector<LinkPair>& SelfQuery::pairs() const { return impl_->pairs; }
 

@@ -7,6 +7,7 @@
 #include "internal/geometry/cancelled.h"
 #include "internal/proximity/deadline.h"
 #include "proximity/object_search.h"
+#include "proximity/within_reach.h"
 
 namespace ist {
 namespace {
@@ -64,7 +65,7 @@ struct WorldQuery::Impl {
 WorldQuery::WorldQuery(std::shared_ptr<const RobotSurfaces> robot, const QueryConfig& config)
     : impl_(std::make_unique<Impl>()) {
   impl_->robot = std::move(robot);
-  impl_->config = config;
+  set_config(config);
   const std::size_t links = impl_->robot->model->links.size();
   impl_->searches.reserve(links);
   for (std::size_t i = 0; i < links; ++i) impl_->searches.emplace_back(*impl_->robot, i);
@@ -74,7 +75,7 @@ WorldQuery::~WorldQuery() = default;
 WorldQuery::WorldQuery(WorldQuery&&) noexcept = default;
 WorldQuery& WorldQuery::operator=(WorldQuery&&) noexcept = default;
 
-void WorldQuery::set_config(const QueryConfig& config) { impl_->config = config; }
+void WorldQuery::set_config(const QueryConfig& config) { impl_->config = within_reach(config); }
 void WorldQuery::set_link_margins(std::vector<double> margins) {
   impl_->link_margins = std::move(margins);
 }

@@ -16,7 +16,6 @@
 #include "arrays.h"
 #include "ist_proximity/facade/robot.h"
 #include "obstacles_class.h"
-#include "query_arguments.h"
 #include "robot_measures.h"
 
 namespace ist::python {
@@ -50,7 +49,7 @@ Raises ModelError when the robot cannot be read or packed.)";
 
 constexpr const char* kQueryDoc =
     R"(obstacles: Obstacles.
-max_distance: [m] a link without an obstacle nearer than this is CLEAR; at most 1e10.
+max_distance: [m] a link without an obstacle nearer than this is CLEAR; more than 1e9, also inf, counts as 1e9.
 tolerance: [m] largest distance - lower_bound; 0: exact.
 margin: [m] subtracted from every lower bound.
 relative_tolerance: tolerance as a share of the distance, where that is wider.
@@ -160,7 +159,6 @@ struct Configurations {
 
 BatchConfig batch_config(double max_distance, double tolerance, double margin,
                          double relative_tolerance, double deadline, int threads) {
-  check_max_distance(max_distance, margin);
   BatchConfig config;
   config.query.max_distance = max_distance;
   config.query.tolerance = tolerance;

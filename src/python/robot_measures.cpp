@@ -10,7 +10,6 @@
 #include "internal/packing/packing_report.h"
 #include "ist_proximity/facade/cost.h"
 #include "obstacles_class.h"
-#include "query_arguments.h"
 
 namespace ist::python {
 namespace {
@@ -74,7 +73,6 @@ py::dict cycle_cost(const Robot& robot, const py::object& given, const PyObstacl
   const DoubleArray q = to_numbers(given, "q is an array of numbers");
   check_shape(q, 2, static_cast<py::ssize_t>(robot.joints().size()),
               "q has the shape (n, joints), joints being the number of Robot.joints");
-  check_max_distance(max_distance, 0.0);
   CycleConfig config;
   config.per_cloud = per_cloud;
   config.period = period;

@@ -17,7 +17,8 @@ using TimePoint = std::chrono::steady_clock::time_point;
 
 /// How a query answers.
 struct QueryConfig {
-  /// [m] a link without an obstacle nearer than this is CLEAR; > 0, +inf for a range without end.
+  /// [m] a link without an obstacle nearer than this is CLEAR; > 0. More than 1e9, also +inf,
+  /// counts as 1e9.
   double max_distance = 1.0;
   /// [m] largest `distance - lower_bound`; 0 asks for the exact distance. >= 0.
   double tolerance = 0.001;
