@@ -25,8 +25,8 @@ namespace ist {
 /// [m] More than double loses where distances are compared.
 inline constexpr double kDistanceRounding = 1e-12;
 
-/// [s] Links of which nothing is known yet may exceed the deadline by so much together, until each
-/// has a bound: an answer that is as late is worth more than none.
+/// [s] Until each link has a first bound, a run may go on for so long after its deadline: an answer
+/// that is this late is worth more than none.
 inline constexpr double kFirstBounds = 5e-5;
 
 /// The part that belongs to the link for ever, whatever its pose and whatever the clouds.
@@ -210,7 +210,7 @@ struct LinkSearch : SearchResult {
   }
 };
 
-/// The three of one link. One thread.
+/// What a query holds of one link: for ever, from search to search, and of one search. One thread.
 struct LinkQueryState {
   explicit LinkQueryState(const LinkModel& link) : context(link), kept(link) {}
 

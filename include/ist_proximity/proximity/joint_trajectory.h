@@ -53,7 +53,8 @@ struct LinkClearance {
   /// where there is contact then, +inf without contact, NaN when not known.
   double contact_time = std::numeric_limits<double>::quiet_NaN();
   /// [m] Lower bound of the distance until the end, or until `contact_time`; NaN when not known. At
-  /// most the least distance, and less by a quarter of it or 2 mm.
+  /// most the least distance, and less by a quarter of it or 2 mm; by more where a joint's second
+  /// derivative is above 16 rad or m, with the time between two waypoints as its unit.
   double lower_bound = std::numeric_limits<double>::quiet_NaN();
   double nearest_time = std::numeric_limits<double>::quiet_NaN();  ///< [s] of the least bound found
   /// False: the search stopped after many steps; the contact, if any, may be much later.

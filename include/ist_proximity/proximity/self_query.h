@@ -58,7 +58,7 @@ struct SelfQueryStatistics {
 /// and cylinders are then measured exactly (a cylinder is a cylinder, not its tessellation).
 /// `distance` is that of two real points, and `distance - lower_bound` is at most the tolerance
 /// where `decided`; at tolerance 0 it is the distance itself, to rounding: some 1e-14 of the
-/// coordinates, or 4e-6 of them where more than thousands of parts are equally near.
+/// coordinates, or 4e-6 of them where more than 4000 pairs of boxes are equally near.
 ///
 /// Contact: where surfaces intersect, or where one link is inside the other. `distance` is then the
 /// signed distance of a point that is inside both links; the deepest point may be deeper, but no
@@ -142,7 +142,7 @@ struct SampledPair {
   bool never() const { return measured > 0 && contacts == 0; }          ///< never in contact
 };
 
-/// Measures pairs at random configurations. Joints without limits turn once about their axis.
+/// Measures pairs at random configurations. Joints without limits are drawn over one turn.
 /// Planar and floating joints, and slides without limits, cannot be drawn: pairs with such a joint
 /// between them are not measured. Deterministic.
 /// @param cancelled  asked between configurations; true ends the sampling. May be empty
