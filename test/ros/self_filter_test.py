@@ -20,7 +20,81 @@ ANGLES = np.linspace(0, 2 * np.pi, 40, endpoint=False)
 BALL = SHELL * np.column_stack([np.cos(ANGLES), np.sin(ANGLES), 0 * ANGLES])
 
 
+class Camera:
+    """Sees a wall across the x axis, and the robot's box before it."""
+
+    WIDTH, HEIGHT, FOCAL, WALL = 160, 120, 140.0, 2.0
+    X_BO = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)  # looks along x
+    RNG = np.random.default_rng(2)
+
+    @classmethod
+    def cloud(cls, X_BL, frame):
+        u, v = np.meshgrid(np.arange(cls.WIDTH) - cls.WIDTH / 2, np.arange(cls.HEIGHT) - cls.HEIGHT / 2)
+        rays = np.column_stack([u.ravel() / cls.FOCAL, v.ravel() / cls.FOCAL, np.ones(u.size)])
+        far = cls.WALL / (rays @ cls.X_BO[:3, :3].T)[:, 0]
+        X_LO = pt.inverse(X_BL) @ cls.X_BO
+        begin, ways = X_LO[:3, 3] - pt.BOX_OFFSET, rays @ X_LO[:3, :3].T
+        sides = (np.array([[[-0.5]], [[0.5]]]) * pt.BOX_SIZE - begin) / ways
+        near, end = sides.min(0).max(1), sides.max(0).min(1)
+        depth = np.where((near < end) & (near > 0), np.minimum(near, far), far)
+        depth += cls.RNG.normal(0, 0.001, depth.shape)
+        message = pt.cloud(rays * depth[:, None], frame)
+        message.width, message.height = cls.WIDTH, cls.HEIGHT
+        message.row_step = message.point_step * cls.WIDTH
+        return message
+
+
 class SelfFilterTest(pt.NodeTest):
+    def test_a_correction_is_of_one_pose(self):
+        """What a view has found out about a sensor's pose is forgotten with another frame or calibration."""
+        ball = np.array([1.6, 1.4, 0.0])  # out of view
+        truth = np.hypot(1.4 - Camera.WALL * 0.5 * Camera.WIDTH / Camera.FOCAL, 0.4) - pt.BALL_RADIUS
+        in_view, away = pt.transform((1, 0, 0), (0.6, 0.8, 0), 0.7), pt.transform((-3, 0, 0))
+        wrong = pt.transform(angle=0.03) @ Camera.X_BO
+
+        def state(one, other=Camera.X_BO):
+            stamp = rospy.Time.now()
+            statics = [("one", one), ("other", other)]
+            self.world._tf_static.publish([pt.transform_message("base", f, X, stamp) for f, X in statics])
+
+        def move_box(X):
+            self.world.stand(ball=pt.transform(ball), box=X)
+
+        def send():
+            box = self.world.poses["box_link"][1]
+            self.world.cloud_publisher.publish(Camera.cloud(box, self.frame))
+
+        def is_right(message):
+            return (
+                message.status == ProximityArray.OK
+                and abs(pt.link(message, "ball_link").distance - truth) < 0.02
+            )
+
+        self.frame = "one"
+        state(wrong)
+        move_box(in_view)
+        self.world.start_tf()
+        self.world.repeat(15, send)
+        self.start(sources={"eye": {"topic": "cloud", "self_filter_mode": "view"}}, max_distance=2.0)
+        for case in ("another frame", "calibrated"):
+            with self.subTest(case):
+                self.frame = "one"
+                state(wrong)
+                move_box(in_view)
+                self.node.wait_for(is_right, "a corrected pose")
+                move_box(away)
+                self.node.wait_for(
+                    lambda m: is_right(m) and m.sources[0].points_on_robot == 0, "the robot out of view"
+                )
+                if case == "calibrated":
+                    state(Camera.X_BO)
+                else:
+                    self.frame = "other"
+                sent = rospy.Time.now() + rospy.Duration(0.3)
+                self.node.wait_for(lambda m: m.cloud_stamp > sent, "clouds of the new pose")
+                for message in self.node.next_messages(20):
+                    self.assertTrue(is_right(message), message)
+
     def ball_at(self, seconds):
         """There and back along x, 2 m in 2 s: so it is never far."""
         phase = (seconds - self.begin) * SPEED % 4.0

@@ -301,9 +301,21 @@ std::string SensorSource::use(const Measurement& measurement) {
   return "";
 }
 
+/// A self-filter by view corrects the sensor's pose by what it has seen before: in another frame,
+/// or since a sensor was calibrated, that pose is right or wrong in another way.
+void SensorSource::begin_view(const std::string& frame) {
+  const std::uint64_t changes = buffer_.static_changes();
+  if (frame == view_frame_ && changes == static_changes_) return;
+  view_frame_ = frame;
+  static_changes_ = changes;
+  if (config_.ingest.self_filter_mode != SelfFilterMode::kView) return;
+  ingest_ = Ingest(ingest_config(config_));
+}
+
 /// @param is_shown  on ~filtered_cloud, which is not cropped at the region of interest
 void SensorSource::take_in(const Measurement& measurement, const Placement& placement,
                            bool is_shown, SourceSnapshot* snapshot) {
+  begin_view(measurement.header.frame_id);
   ingest_.set_region_of_interest(is_shown ? RegionOfInterest() : target_.region);
   PlacedZones zones;
   if (config_.has_zones()) zones = zones_.place(target_.fixed_frame, measurement.header.stamp);

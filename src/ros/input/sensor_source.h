@@ -3,6 +3,7 @@
 #include <ros/publisher.h>
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -64,6 +65,7 @@ class SensorSource : public Source {
   void place_newest();
   void use_map();
   std::string use(const Measurement& measurement);
+  void begin_view(const std::string& frame);
   void take_in(const Measurement& measurement, const Placement& placement, bool is_shown,
                SourceSnapshot* snapshot);
   void take_in_zones(const Measurement& measurement, const Placement& placement,
@@ -91,6 +93,8 @@ class SensorSource : public Source {
   ros::Time in_use_;                  ///< stamp of the newest snapshot of this generation
   std::uint64_t content_ = 0;         ///< Measurement::content of the newest message
   std::string frame_, frame_before_;  ///< of the newest message, and another one before it
+  std::string view_frame_;            ///< of the clouds that ingest_ has seen,
+  std::uint64_t static_changes_ = 0;  ///< while so many static transforms had changed
   std::map<std::string, ros::Time> frames_left_;  ///< when another one took a frame's place
   ros::Time frames_alternate_until_;
   std::chrono::steady_clock::time_point target_since_;  ///< with this model and generation

@@ -88,6 +88,7 @@ void TransformBuffer::forget_moving() {
     }
     gaps_ -= record.gaps.size();
     record.statements.forget_moving();
+    kept.newest_static = record.newest_static;
     kept.is_static_in_tf = record.is_static_in_tf;
     kept.frozen = record.frozen;
     if (kept.refusal.empty() && record.statements.empty() && !kept.is_static_in_tf) {
@@ -196,6 +197,11 @@ void TransformBuffer::note_turn(const geometry_msgs::TransformStamped& transform
                                 const TransformPublisher& publisher, bool is_static,
                                 Record* record) {
   if (is_static) {
+    geometry_msgs::TransformStamped& newest = record->newest_static;
+    const bool is_same = newest.transform == transform.transform &&
+                         newest.header.frame_id == transform.header.frame_id;
+    if (!newest.child_frame_id.empty() && !is_same) ++static_changes_;
+    newest = transform;
     record->is_static_in_tf = record->is_static_in_tf || record->newest.isZero();
     if (!record->frozen.empty()) --disputes_;
     return record->frozen.clear();
@@ -249,7 +255,10 @@ void TransformBuffer::change_statements(const Change& change, Record* record) {
   if (is_disputed && !was_disputed) ++disputes_;
   if (is_disputed || !was_disputed) return;
   --disputes_;
-  for (const auto& left : statements.statics()) setTransform(left, "", true);
+  for (const auto& left : statements.statics()) {
+    setTransform(left, "", true);
+    ++static_changes_;
+  }
 }
 
 void TransformBuffer::compare(const geometry_msgs::TransformStamped& transform,

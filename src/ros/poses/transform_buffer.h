@@ -10,6 +10,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <mutex>
 #include <set>
@@ -84,6 +85,10 @@ class TransformBuffer : public tf2::BufferCore {
   /// @param fixed  where the way up ends, if it is on the way
   std::string why_refused(const std::string& fixed, const std::string& frame) const;
 
+  /// Counts the static transforms that have been replaced by others: what stands there was moved,
+  /// or was somewhere else all the time.
+  std::uint64_t static_changes() const { return static_changes_; }
+
   /// Says that two publishers state a transform between two frames differently, and since when;
   /// empty where none is in dispute. It costs nothing while there is no dispute at all.
   std::string dispute(const std::string& fixed, const std::string& frame) const;
@@ -114,6 +119,7 @@ class TransformBuffer : public tf2::BufferCore {
     int good_since = 0;               ///< transforms of that publisher that were used since
     FrameStatements statements;
     TransformGaps gaps;
+    geometry_msgs::TransformStamped newest_static;
     bool is_static_in_tf = false;  ///< tf2 has it without time, whatever comes later
     std::string frozen;            ///< a sentence: it moves all the same; empty: it does not
 
@@ -149,6 +155,7 @@ class TransformBuffer : public tf2::BufferCore {
   bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
   std::atomic<std::size_t> disputes_{0};  ///< records with a dispute, and those that are frozen
   std::atomic<std::size_t> gaps_{0};      ///< of all records
+  std::atomic<std::uint64_t> static_changes_{0};
   ros::Time last_now_;
   std::set<std::string> ignored_;
 
