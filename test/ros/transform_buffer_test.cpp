@@ -120,6 +120,22 @@ TEST(TransformBuffer, agesCountFromReceipt) {
   EXPECT_EQ(buffer.counts_from("world", "base", ros::Time(99.99)), ros::Time(99.99));
 }
 
+// A frame of which nobody knows yet how it moves may be anywhere by now.
+TEST(TransformBuffer, placesALateFrameWhenItsMotionIsKnown) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  Lag lag;
+  Eigen::Isometry3d X_FT;
+  for (int i = 0; i < 8; ++i) {
+    const double t = 100.0 + 0.05 * i;
+    EXPECT_EQ(buffer.add(transform("base", "part", t, t), "/a", false, ros::Time(t)), "");
+    EXPECT_EQ(look_up_near(buffer, "base", "part", ros::Time(t), 0.5, &X_FT, &lag), "");
+    const std::string problem =
+        look_up_near(buffer, "base", "part", ros::Time(t + 0.22), 0.5, &X_FT, &lag);
+    EXPECT_EQ(problem.empty(), i > 4) << problem;
+    if (i <= 4) EXPECT_NE(problem.find("'part' is 0.22 s old"), std::string::npos) << problem;
+  }
+}
+
 // A late frame is looked up in every cycle.
 TEST(TransformBuffer, tellsHowALateFrameMovedWithoutAllocationsOfItsOwn) {
   TransformBuffer buffer(ros::Duration(10.0));

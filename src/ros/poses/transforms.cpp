@@ -127,12 +127,17 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
     return look_up(buffer, fixed, frame, time, X_FT);
   }
   ros::Time stamp;
-  std::string problem = look_up_newest(buffer, fixed, frame, time, max_age, X_FT, &stamp);
-  if (!problem.empty() || !lag || stamp.isZero()) return problem;
+  Eigen::Isometry3d X_newest;
+  std::string problem = look_up_newest(buffer, fixed, frame, time, max_age, &X_newest, &stamp);
+  if (!problem.empty()) return problem;
+  if (!lag || stamp.isZero()) {
+    *X_FT = X_newest;
+    return "";
+  }
   lag->frame = frame;
   lag->age = std::abs(seconds_between(stamp, time));
   lag->window = std::max(lag->age, kLeastWindow);
-  Eigen::Isometry3d X_after = *X_FT;
+  Eigen::Isometry3d X_after = X_newest;
   while (lag->windows < Lag::kMostWindows && stamp.toSec() > lag->window) {
     Eigen::Isometry3d X;
     stamp -= ros::Duration(lag->window);
@@ -140,6 +145,14 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
     lag->moved[lag->windows++] = X_after * X.inverse();
     X_after = X;
   }
+  if (lag->windows == 0) {
+    return "the newest pose of frame '" + frame + "' is " +
+           format_text(
+               "%.2f s old, and how it moves is not known yet: its poses of %.2f s are "
+               "needed",
+               lag->age, lag->window);
+  }
+  *X_FT = X_newest;
   return "";
 }
 
