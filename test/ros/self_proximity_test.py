@@ -8,11 +8,12 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
+from geometry_msgs.msg import Point, Pose, Quaternion
 from joint_states_test import ARM, JointStatesTest, joint_state
 from proximity_testing import LinkProximity, ProximityArray
 
 from ist_proximity.msg import JointRepulsion, LinkPair
-from ist_proximity.srv import ListLinkPairs
+from ist_proximity.srv import AttachObject, AttachObjectRequest, ListLinkPairs
 
 SRDF = '<robot name="arm"><disable_collisions link1="box_link" link2="ball_link"/></robot>'
 SRDF_DEFAULT = '<robot name="arm"><disable_default_collisions link="box_link"/></robot>'
@@ -210,6 +211,27 @@ class SelfProximityTest(unittest.TestCase):
         finally:
             subscriber.unregister()
             world.stop()
+
+    def test_what_touches_at_rest_because_it_is_carried(self):
+        """A tool that is in the box with all joints at zero is far from it elsewhere, and watched."""
+        node = self.start("carried")
+        self.q["slide"] = 0.5
+        is_far = lambda gap: lambda m: abs(pt.link(m, "ball_link").distance - gap) < 0.0011  # noqa: E731
+        node.wait_for(is_far(1.5), "the links without the tool")
+        attach = rospy.ServiceProxy(node.name + "/attach_object", AttachObject)
+        attach.wait_for_service(pt.TIMEOUT)
+        answer = attach(
+            name="tool",
+            link="ball_link",
+            shape=AttachObjectRequest.SPHERE,
+            dimensions=[0.1],
+            pose=Pose(Point(-0.3, 0.0, 0.0), Quaternion(w=1.0)),
+        )
+        self.assertTrue(answer.success, answer.message)
+        message = node.wait_for(is_far(1.2), "the distance of the tool")
+        self.assertLessEqual(pt.link(message, "ball_link").lower_bound, 1.2 + 1e-6)
+        self.q["slide"] = 0.0
+        node.wait_for(lambda m: pt.states(m) == [LinkProximity.CONTACT] * 2, "contact of tool and box")
 
     def test_left_out(self):
         for case, srdf in (("by_srdf", SRDF), ("by_default", SRDF_DEFAULT)):

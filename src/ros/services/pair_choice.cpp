@@ -9,12 +9,49 @@
 namespace ist {
 namespace {
 
+constexpr int kCoarse = 64;  // spheres of a link's packing
+
 /// @param pairs  sorted
 bool holds(const std::vector<LinkPair>& pairs, const LinkPair& pair) {
   return std::binary_search(
       pairs.begin(), pairs.end(), pair, [](const LinkPair& one, const LinkPair& other) {
         return std::tie(one.first, one.second) < std::tie(other.first, other.second);
       });
+}
+
+/// The robot without what its links carry, its links in the same places. Queries are exact with any
+/// packing, so that of a link that carries something is coarse.
+/// @returns null when cancelled
+std::shared_ptr<const RobotModel> without_objects(const ModelState& model,
+                                                  const std::function<bool()>& cancelled) {
+  if (model.objects.empty()) return model.robot;
+  RobotModelConfig config;
+  config.packing.max_spheres = kCoarse;
+  for (const AttachedObject& object : model.objects) config.links.push_back(object.link);
+  RobotModelCallbacks callbacks;
+  callbacks.cancelled = cancelled;
+  const auto bare = build_robot_model(*model.description, config, callbacks);
+  if (!bare) return nullptr;
+  auto robot = std::make_shared<RobotModel>(*model.robot);
+  for (LinkModel& link : robot->links) {
+    for (const LinkModel& own : bare->links) {
+      if (own.name == link.name) link = own;
+    }
+  }
+  return robot;
+}
+
+/// The pairs that touch with all joints at zero, always or nearly so. What a link carries does not
+/// count: a pair that a tool touches at zero is apart elsewhere, and has to be watched.
+std::vector<LinkPair> touching_at_rest(const ModelState& model, std::vector<LinkPair> pairs,
+                                       const std::function<bool()>& cancelled) {
+  const auto robot = without_objects(model, cancelled);
+  if (!robot) return {};
+  const auto is_unusable = [&robot](const LinkPair& pair) {
+    return !robot->links[pair.first].usable() || !robot->links[pair.second].usable();
+  };
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_unusable), pairs.end());
+  return in_contact_at_rest(robot, *model.kinematics, pairs, cancelled);
 }
 
 }  // namespace
@@ -59,8 +96,7 @@ PairChoice choose_pairs(const std::shared_ptr<const ModelState>& monitoring,
     return self_collision_pairs(robot, *model.kinematics, wanted, {}, by);
   };
   const std::vector<LinkPair> candidates = pairs_by(only_enabled), left = pairs_by(rules);
-  const std::vector<LinkPair> at_rest =
-      in_contact_at_rest(model.robot, *model.kinematics, left, cancelled);
+  const std::vector<LinkPair> at_rest = touching_at_rest(model, left, cancelled);
   const auto reason_of = [&](const LinkPair& pair) {
     if (!wanted[pair.first] || !wanted[pair.second]) return PairReason::kUnusable;
     if (!holds(candidates, pair)) return PairReason::kAdjacent;
