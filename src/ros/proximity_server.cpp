@@ -186,7 +186,7 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
 /// @param is_of_cycle  whether the cycle has made it
 void ProximityServer::Impl::publish(const ist_proximity::ProximityArrayConstPtr& message,
                                     bool is_of_cycle, const SpeedScaleConfig& speed_scale) {
-  const auto self = is_of_cycle && self_proximity_ ? self_proximity_->newest() : nullptr;
+  const auto self = is_of_cycle && self_proximity_ ? self_proximity_->newest(*model_) : nullptr;
   const bool has_cycle = is_of_cycle && cycle_;
   summary_.publish(*message, self.get(), speed_scale, ros::Time::now(),
                    has_cycle ? cycle_->full_speed_reach() : Span<const StoppingReach>());

@@ -11,9 +11,10 @@ import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 from joint_states_test import ARM, JointStatesTest, joint_state
 from proximity_testing import LinkProximity, ProximityArray
+from std_msgs.msg import Float64
 
 from ist_proximity.msg import JointRepulsion, LinkPair
-from ist_proximity.srv import AttachObject, AttachObjectRequest, ListLinkPairs
+from ist_proximity.srv import AttachObject, AttachObjectRequest, DetachObject, ListLinkPairs
 
 SRDF = '<robot name="arm"><disable_collisions link1="box_link" link2="ball_link"/></robot>'
 SRDF_DEFAULT = '<robot name="arm"><disable_default_collisions link="box_link"/></robot>'
@@ -232,6 +233,38 @@ class SelfProximityTest(unittest.TestCase):
         self.assertLessEqual(pt.link(message, "ball_link").lower_bound, 1.2 + 1e-6)
         self.q["slide"] = 0.0
         node.wait_for(lambda m: pt.states(m) == [LinkProximity.CONTACT] * 2, "contact of tool and box")
+
+    def test_minimum_of_what_is_carried(self):
+        """As soon as it is known again, ~min_distance is that of the links with the tool."""
+        node = self.start("minimum", **{"self_collision/in_minimum": True, "self_filter": False})
+        self.q["slide"] = 0.5
+        world = pt.World(self.namespace)
+        points = np.array([[9.0, 9.0, 9.0]])
+        world.repeat(100, lambda: world.cloud_publisher.publish(pt.cloud(points, "base")))
+        minima = []
+        subscriber = rospy.Subscriber(node.name + "/min_distance", Float64, lambda m: minima.append(m.data))
+        attach = rospy.ServiceProxy(node.name + "/attach_object", AttachObject)
+        detach = rospy.ServiceProxy(node.name + "/detach_object", DetachObject)
+        attach.wait_for_service(pt.TIMEOUT)
+        pose = Pose(Point(-0.3, 0.0, 0.0), Quaternion(w=1.0))
+        tool = {"name": "tool", "link": "ball_link", "shape": AttachObjectRequest.SPHERE}
+        firsts = []
+        try:
+            for _ in range(12):
+                pt.wait_until(lambda: minima and abs(minima[-1] - 1.5) < 0.0011, "the minimum")
+                begin = len(minima)
+                self.assertTrue(attach(dimensions=[0.1], pose=pose, **tool).success)
+                pt.wait_until(lambda: abs(minima[-1] - 1.2) < 0.0011, "the minimum with the tool")
+                after = minima[begin:]
+                unknown = np.flatnonzero(np.isnan(after))
+                if unknown.size:
+                    firsts += [one for one in after[unknown[0] :] if np.isfinite(one)]
+                self.assertTrue(detach("tool").success)
+        finally:
+            subscriber.unregister()
+            world.stop()
+        self.assertTrue(firsts)
+        self.assertLessEqual(max(firsts), 1.2 + 1e-6)
 
     def test_left_out(self):
         for case, srdf in (("by_srdf", SRDF), ("by_default", SRDF_DEFAULT)):

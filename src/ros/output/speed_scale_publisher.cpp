@@ -113,7 +113,7 @@ void SpeedScalePublisher::publish(const ProximityArray& result, const ProximityA
   self_problem_.clear();
   if (self_counts_ && !is_fresh(self, now)) {
     self_problem_ = self ? "the newest ~self_proximity is too old, or of another model"
-                         : "no ~self_proximity has come yet";
+                         : "no ~self_proximity of this model has come yet";
   }
   const bool is_known = is_usable(result) && self_problem_.empty();
   min_distance_ = std::numeric_limits<double>::quiet_NaN();

@@ -35,15 +35,18 @@ SelfProximity::~SelfProximity() {
   thread_.join();
 }
 
-ProximityArrayConstPtr SelfProximity::newest() const {
+ProximityArrayConstPtr SelfProximity::newest(const ModelState& model) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return newest_;
+  const bool is_of_model =
+      newest_model_ && (newest_model_.get() == &model || is_refinement(*newest_model_, model));
+  return is_of_model ? newest_ : nullptr;
 }
 
 void SelfProximity::publish(const ProximityArrayConstPtr& message) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     newest_ = message;
+    newest_model_ = loaded_;
   }
   publish_message(publisher_, message);
 }

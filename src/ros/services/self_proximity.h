@@ -40,8 +40,9 @@ class SelfProximity {
                 std::function<LiveConfig()> live);
   ~SelfProximity();
 
-  /// The message that was published last; null before the first. Thread safe.
-  ist_proximity::ProximityArrayConstPtr newest() const;
+  /// The message that was published last; null where it is of another model, or before the first.
+  /// Thread safe.
+  ist_proximity::ProximityArrayConstPtr newest(const ModelState& model) const;
 
  private:
   void run();
@@ -67,8 +68,9 @@ class SelfProximity {
 
   StopSignal stop_signal_;
   const std::function<bool()> is_stopped_ = [this] { return stop_signal_.stopped(); };
-  mutable std::mutex mutex_;  // guards the next one
+  mutable std::mutex mutex_;  // guards the next two
   ist_proximity::ProximityArrayConstPtr newest_;
+  std::shared_ptr<const ModelState> newest_model_;  ///< of which newest_ tells
 
   // Used by the thread alone.
   std::shared_ptr<const ModelState> loaded_, model_;  ///< the latter with the paired links
