@@ -116,6 +116,17 @@ class AttachedTest(unittest.TestCase):
         self.detach_well("on_base")
         node.wait_for(lambda m: m.status == 0 and len(m.links) == 2, "the base gone")
 
+    def test_object_whose_link_is_gone(self):
+        """An object that another URDF cannot carry is told for as long as that is in use."""
+        node = self.start()
+        node.wait_for_status(ProximityArray.OK)
+        self.attach_well()
+        rospy.set_param(self.namespace + "/robot_description", pt.urdf().replace("ball_link", "other_link"))
+        self.assertTrue(node.reload().success)
+        node.wait_until(
+            lambda: "no longer attached" in node.diagnostic("model", "warning"), "the object that is gone"
+        )
+
     def test_shapes_and_faults(self):
         node = self.start(links=["box_link"])
         node.wait_for_status(ProximityArray.OK)

@@ -240,7 +240,7 @@ RobotDescription ModelLoader::carry_over_objects(ModelState* state) {
       carrying = with_objects(carrying, {object});
       kept.push_back(object);
     } catch (const ModelError& error) {
-      ROS_WARN_STREAM("no longer attached: " << error.what());
+      state->warnings.push_back(std::string("no longer attached: ") + error.what());
     }
   }
   state->objects = kept;
