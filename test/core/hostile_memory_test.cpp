@@ -12,11 +12,11 @@
 
 #include "internal/cloud/memory_body.h"
 #include "internal/cloud/memory_scan.h"
-#include "ist_proximity/cloud/depth_image.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/cloud/seen_space.h"
 #include "support/demo_arm.h"
+#include "support/images.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/temp_dir.h"
@@ -288,6 +288,15 @@ TEST(HostileMemory, ABodyIsFreeWithinItsSpheresAlone) {
   EXPECT_GT(known, 500);
 }
 
+// [m] From the nearest of the links, negative inside.
+double distance_to(const std::vector<PosedSolid>& robot, const Eigen::Vector3d& p_F) {
+  double least = kInfinity;
+  for (const PosedSolid& link : robot) {
+    least = std::min(least, link.solid->signed_distance(link.X_FL.inverse() * p_F).distance);
+  }
+  return least;
+}
+
 // The robot's own space is that of its exact solids and a skin, as promised. The cover spheres of
 // this arm reach 34 mm out of it, and coarse ones 50 mm, to where nothing has been seen.
 TEST(HostileMemory, TheBodyIsNoLargerThanTheRobotAndItsSkin) {
@@ -302,10 +311,7 @@ TEST(HostileMemory, TheBodyIsNoLargerThanTheRobotAndItsSkin) {
     std::vector<PosedSolid> robot;
     for (const LinkModel& link : model->links) {
       if (!link.usable() || link.tree.empty()) continue;
-      robot.emplace_back();
-      robot.back().tree = &link.tree;
-      robot.back().solid = &link.solid;
-      robot.back().X_FL = test::random_pose(&rng, 0.4);
+      robot.push_back({&link.tree, &link.solid, test::random_pose(&rng, 0.4)});
     }
     ASSERT_GT(robot.size(), 5U);
     MemoryMap body{{}};
@@ -313,11 +319,7 @@ TEST(HostileMemory, TheBodyIsNoLargerThanTheRobotAndItsSkin) {
     int known = 0, inside = 0;
     for (int i = 0; i < test::scaled(60000); ++i) {
       const Eigen::Vector3d p_F = test::random_vector(&rng, 0.9);
-      double distance = kInfinity;
-      for (const PosedSolid& solid : robot) {
-        distance =
-            std::min(distance, solid.solid->signed_distance(solid.X_FL.inverse() * p_F).distance);
-      }
+      const double distance = distance_to(robot, p_F);
       const Eigen::Vector3d p_M = X_MF * p_F;
       const bool is_known = body.state(p_M) == VoxelState::kFree;
       known += is_known ? 1 : 0;
@@ -337,18 +339,9 @@ TEST(HostileMemory, DepthsThatSayNothingClearNothing) {
   camera.width = 4;
   camera.height = 1;
   camera.P = {100, 0, 1.5, 0, 0, 100, 0, 0, 0, 0, 1, 0};
-  std::shared_ptr<const DepthRays> rays;
-  ASSERT_EQ(check_camera(camera, &rays), "");
-  const float depths[] = {static_cast<float>(kNaN), -1.0F, 0.0F, static_cast<float>(-kInfinity)};
-  DepthImage image;
-  image.encoding = "32FC1";
-  image.width = 4;
-  image.height = 1;
-  image.step = 16;
-  image.data = reinterpret_cast<const std::uint8_t*>(depths);
-  image.data_size = sizeof depths;
-  RawCloud raw;
-  ASSERT_EQ(check_depth_image(image, rays, &raw), "");
+  const std::vector<float> depths = {static_cast<float>(kNaN), -1.0F, 0.0F,
+                                     static_cast<float>(-kInfinity)};
+  const RawCloud raw = test::depth_cloud(test::rays_of(camera), depths);
   Ingest ingest({});
   CloudSnapshot snapshot;
   ingest.run(raw, Eigen::Isometry3d::Identity(), {}, 5.0, &snapshot);

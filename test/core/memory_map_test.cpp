@@ -12,9 +12,9 @@
 #include <string>
 
 #include "internal/cloud/memory_scan.h"
-#include "ist_proximity/cloud/depth_image.h"
 #include "ist_proximity/cloud/seen_space.h"
 #include "support/errors.h"
+#include "support/images.h"
 #include "support/scene.h"
 #include "support/temp_dir.h"
 
@@ -360,18 +360,8 @@ TEST(MemoryScan, OfADepthImage) {
   camera.width = 4;
   camera.height = 1;
   camera.P = {100, 0, 1.5, 0, 0, 100, 0, 0, 0, 0, 1, 0};
-  std::shared_ptr<const DepthRays> rays;
-  ASSERT_EQ(check_camera(camera, &rays), "");
-  const float depths[] = {1.0F, std::nanf(""), static_cast<float>(kInfinity), 8.0F};
-  DepthImage image;
-  image.encoding = "32FC1";
-  image.width = 4;
-  image.height = 1;
-  image.step = 16;
-  image.data = reinterpret_cast<const std::uint8_t*>(depths);
-  image.data_size = sizeof depths;
-  RawCloud raw;
-  ASSERT_EQ(check_depth_image(image, rays, &raw), "");
+  const std::vector<float> depths = {1.0F, std::nanf(""), static_cast<float>(kInfinity), 8.0F};
+  const RawCloud raw = test::depth_cloud(test::rays_of(camera), depths);
   Ingest ingest({});
   CloudSnapshot snapshot;
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cloud/format/point_reader.h"
-#include "ist_proximity/cloud/depth_image.h"
+#include "support/images.h"
 #include "support/scene.h"
 
 namespace ist {
@@ -124,21 +124,10 @@ TEST(NoiseFilter, DepthImage) {
   camera.width = 32;
   camera.height = 24;
   camera.K = {40, 0, 16, 0, 40, 12, 0, 0, 1};
-  std::shared_ptr<const DepthRays> rays;
-  ASSERT_EQ(check_camera(camera, &rays), "");
   std::vector<float> depths(std::size_t{32} * 24, 0.8F);
   depths[10 * 32 + 7] = 0.4F;
   depths[11] = 0.0F;
-  DepthImage image;
-  image.encoding = "32FC1";
-  image.width = 32;
-  image.height = 24;
-  image.step = 32 * sizeof(float);
-  image.data = reinterpret_cast<const std::uint8_t*>(depths.data());
-  image.data_size = depths.size() * sizeof(float);
-  RawCloud cloud;
-  ASSERT_EQ(check_depth_image(image, rays, &cloud), "");
-  EXPECT_EQ(check(cloud, {0.05, 4}, 3.0), 1U);
+  EXPECT_EQ(check(test::depth_cloud(test::rays_of(camera), depths), {0.05, 4}, 3.0), 1U);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <memory>
 #include <random>
+#include <stdexcept>
+#include <string>
 
 namespace ist::test {
 
@@ -29,6 +31,27 @@ Image wall(std::size_t width, std::size_t height, double noise, Rng* rng) {
     image.at(i) = (depth * Eigen::Vector3d(u, v, 1.0)).cast<float>();
   }
   return image;
+}
+
+std::shared_ptr<const DepthRays> rays_of(const CameraModel& camera) {
+  std::shared_ptr<const DepthRays> rays;
+  const std::string fault = check_camera(camera, &rays);
+  if (!fault.empty()) throw std::invalid_argument(fault);
+  return rays;
+}
+
+RawCloud depth_cloud(const std::shared_ptr<const DepthRays>& rays, Span<const float> depths) {
+  DepthImage image;
+  image.encoding = "32FC1";
+  image.width = static_cast<std::uint32_t>(rays->x.size());
+  image.height = static_cast<std::uint32_t>(rays->y.size());
+  image.step = 4 * image.width;
+  image.data = reinterpret_cast<const std::uint8_t*>(depths.data());
+  image.data_size = 4 * depths.size();
+  RawCloud cloud;
+  const std::string fault = check_depth_image(image, rays, &cloud);
+  if (!fault.empty()) throw std::invalid_argument(fault);
+  return cloud;
 }
 
 }  // namespace ist::test

@@ -2,12 +2,14 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
+#include "ist_proximity/cloud/depth_image.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "support/scene.h"
 
-/// Organized clouds for tests of what is kept from image to image.
+/// Organized clouds and depth images.
 namespace ist::test {
 
 /// A message of some pixels; NaN where nothing was measured.
@@ -24,5 +26,10 @@ struct Image {
 
 /// A wall 1 m in front of the camera, with a step, and noise [m] along its axis.
 Image wall(std::size_t width, std::size_t height, double noise, Rng* rng);
+
+/// @throws std::invalid_argument where the library refuses the camera or the image
+std::shared_ptr<const DepthRays> rays_of(const CameraModel& camera);
+/// An image of depths [m], which must outlive the snapshot, too.
+RawCloud depth_cloud(const std::shared_ptr<const DepthRays>& rays, Span<const float> depths);
 
 }  // namespace ist::test
