@@ -17,6 +17,7 @@
 #include "ist_proximity/proximity/world_query.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/random_numbers.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/world_oracle.h"
@@ -39,6 +40,15 @@ class ChangingWorld {
   }
 
   double uniform(double low, double high) { return test::uniform(&rng, low, high); }
+
+  // Something comes, goes, or moves in its frame, and the frames move.
+  void change(int step) {
+    if (step % 3 == 0) add();
+    if (step % 5 == 4) remove();
+    if (step % 7 == 6) move();
+    const double size = step % 4 == 0 ? uniform(0, 0.5) : 1e-3;
+    for (auto& X : X_FB_) X = X * test::random_pose(&rng, size);
+  }
 
   // Adds or replaces one of a few names.
   void add() {
@@ -68,9 +78,6 @@ class ChangingWorld {
     known.X_BO = known.X_BO * test::random_pose(&rng, uniform(0, 0.3));
     EXPECT_EQ(builder_.move(name, known.frame, known.X_BO), "");
     is_changed_ = true;
-  }
-  void move_frames(double size) {
-    for (auto& X : X_FB_) X = X * test::random_pose(&rng, size);
   }
 
   const PosedWorld& posed() {
@@ -118,64 +125,103 @@ class ChangingWorld {
   bool is_changed_ = true;
 };
 
+double often_zero(test::Rng* rng, double probability, double most) {
+  return test::chance(rng, probability) ? 0.0 : test::uniform(rng, 0.0, most);
+}
+
+QueryConfig random_config(test::Rng* rng) {
+  QueryConfig config;
+  config.max_distance = test::power_of_ten(rng, -2.0, 0.3);
+  config.tolerance = test::chance(rng, 0.3) ? 0.0 : 0.002;
+  config.relative_tolerance = test::chance(rng, 0.7) ? 0.0 : 0.2;
+  config.margin = often_zero(rng, 0.7, 0.2);
+  return config;
+}
+
+struct Answers {
+  int all = 0, clear = 0, near = 0, unfinished_queries = 0;
+
+  void expect(const LinkProximity& r, double truth, double max_distance, bool has_deadline) {
+    ASSERT_LE(r.lower_bound, truth + 1e-9);
+    if (!has_deadline) ASSERT_NE(r.state, LinkState::kUnknown);
+    if (r.state == LinkState::kClear) ASSERT_GE(truth, max_distance - 1e-9);
+    ++all;
+    clear += r.state == LinkState::kClear ? 1 : 0;
+    near += r.state == LinkState::kNear ? 1 : 0;
+  }
+};
+
+// The links move, and so does what the query is asked for.
+void expect_step(ChangingWorld* world, int step, std::vector<Eigen::Isometry3d>* X_FL,
+                 WorldQuery* query, Answers* answers) {
+  test::Rng* rng = &world->rng;
+  world->change(step);
+  for (auto& X : *X_FL) X = X * test::random_pose(rng, test::power_of_ten(rng, -5, -0.7));
+  const QueryConfig config = random_config(rng);
+  query->set_config(config);
+  std::vector<double> margins;
+  for (std::size_t i = 0; i < X_FL->size(); ++i) margins.push_back(often_zero(rng, 0.7, 0.3));
+  query->set_link_margins(margins);
+  query->set_influence_distance(often_zero(rng, 0.5, 0.5));
+  const bool has_deadline = step % 6 == 5;
+  const PosedWorld& posed = world->posed();
+  if (has_deadline) Deadline::asks_left_for_test = static_cast<int>(world->uniform(0, 30));
+  const TimePoint end =
+      has_deadline ? std::chrono::steady_clock::now() + std::chrono::hours(1) : TimePoint::max();
+  std::vector<LinkProximity> results;
+  const std::vector<bool> known(X_FL->size(), true);
+  const bool complete = query->run(*X_FL, known, {&posed}, end, &results);
+  Deadline::asks_left_for_test = -1;
+  ASSERT_TRUE(complete || has_deadline);
+  answers->unfinished_queries += complete ? 0 : 1;
+  for (std::size_t i = 0; i < X_FL->size(); ++i) {
+    const double truth = world->truth(i, (*X_FL)[i]) - config.margin - margins[i];
+    SCOPED_TRACE(::testing::Message() << "link " << i << ", deadline " << has_deadline);
+    answers->expect(results[i], truth, config.max_distance, has_deadline);
+  }
+}
+
 TEST(HostileWorld, NoBoundIsAboveTheTruthWhateverComesAndGoes) {
-  int cases = 0, clear = 0, near = 0, unfinished = 0;
+  Answers answers;
   for (const std::uint64_t seed : {7U, 8U}) {
     ChangingWorld world(seed);
-    const auto robot = make_robot_surfaces(test::model_of(world.links, 0.02));
-    WorldQuery query(robot, {});
+    WorldQuery query(make_robot_surfaces(test::model_of(world.links, 0.02)), {});
     std::vector<Eigen::Isometry3d> X_FL(world.links.size());
     for (auto& X : X_FL) X = test::random_pose(&world.rng, 1.0);
-    std::vector<bool> known(world.links.size(), true);
-    std::vector<LinkProximity> results;
     for (int step = 0; step < test::scaled(100); ++step) {
-      if (step % 3 == 0) world.add();
-      if (step % 5 == 4) world.remove();
-      if (step % 7 == 6) world.move();
-      world.move_frames(step % 4 == 0 ? world.uniform(0, 0.5) : 1e-3);
-      for (auto& X : X_FL) {
-        X = X * test::random_pose(&world.rng, std::pow(10.0, world.uniform(-5, -0.7)));
-      }
-      QueryConfig config;
-      config.max_distance = std::pow(10.0, world.uniform(-2.0, 0.3));
-      config.tolerance = world.uniform(0, 1) < 0.3 ? 0.0 : 0.002;
-      config.relative_tolerance = world.uniform(0, 1) < 0.7 ? 0.0 : 0.2;
-      config.margin = world.uniform(0, 1) < 0.7 ? 0.0 : world.uniform(0.0, 0.2);
-      query.set_config(config);
-      std::vector<double> margins;
-      for (std::size_t i = 0; i < X_FL.size(); ++i) {
-        margins.push_back(world.uniform(0, 1) < 0.7 ? 0.0 : world.uniform(0, 0.3));
-      }
-      query.set_link_margins(margins);
-      query.set_influence_distance(world.uniform(0, 1) < 0.5 ? 0.0 : world.uniform(0, 0.5));
-      const bool has_deadline = step % 6 == 5;
-      const PosedWorld& posed = world.posed();
-      if (has_deadline) Deadline::asks_left_for_test = static_cast<int>(world.uniform(0, 30));
-      const TimePoint end = has_deadline ? std::chrono::steady_clock::now() + std::chrono::hours(1)
-                                         : TimePoint::max();
-      const bool complete = query.run(X_FL, known, {&posed}, end, &results);
-      Deadline::asks_left_for_test = -1;
-      ASSERT_TRUE(complete || has_deadline);
-      unfinished += complete ? 0 : 1;
-      for (std::size_t i = 0; i < X_FL.size(); ++i) {
-        const LinkProximity& r = results[i];
-        const double truth = world.truth(i, X_FL[i]) - config.margin - margins[i];
-        SCOPED_TRACE(::testing::Message() << "seed " << seed << ", step " << step << ", link " << i
-                                          << ", deadline " << has_deadline << ", truth " << truth
-                                          << ", state " << static_cast<int>(r.state));
-        ASSERT_LE(r.lower_bound, truth + 1e-9);
-        if (!has_deadline) ASSERT_NE(r.state, LinkState::kUnknown);
-        if (r.state == LinkState::kClear) ASSERT_GE(truth, config.max_distance - 1e-9);
-        ++cases;
-        clear += r.state == LinkState::kClear ? 1 : 0;
-        near += r.state == LinkState::kNear ? 1 : 0;
-      }
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << ", step " << step);
+      expect_step(&world, step, &X_FL, &query, &answers);
+      if (HasFatalFailure()) return;
     }
   }
   if (test::kSanitized) return;  // too few cases to count
-  EXPECT_GT(clear, cases / 20);
-  EXPECT_GT(near, cases / 5);
-  EXPECT_GT(unfinished, 0);
+  EXPECT_GT(answers.clear, answers.all / 20);
+  EXPECT_GT(answers.near, answers.all / 5);
+  EXPECT_GT(answers.unfinished_queries, 0);
+}
+
+WorldObject object_of(const std::string& name, const Shape& shape) {
+  WorldObject object;
+  object.name = name;
+  object.frame = "world";
+  object.geometry = test::one(shape);
+  return object;
+}
+
+PosedWorld world_of(const WorldObject& object) {
+  WorldBuilder builder;
+  EXPECT_TRUE(builder.add({object}).empty()) << object.name;
+  return {builder.world(), {Eigen::Isometry3d::Identity()}};
+}
+
+// The answer for a ball of 0.05 m in one place.
+LinkProximity answer_at(const Eigen::Vector3d& p_F, const QueryConfig& config,
+                        const PosedWorld& world) {
+  WorldQuery query(make_robot_surfaces(test::make_model({Sphere{0.05}}, 0.005)), config);
+  const Eigen::Isometry3d X_FL(Eigen::Translation3d{p_F});
+  std::vector<LinkProximity> results;
+  EXPECT_TRUE(query.run({X_FL}, {true}, {&world}, TimePoint::max(), &results));
+  return results.at(0);
 }
 
 // Whatever is sent is in the world, or there is a fault that names it: nothing is lost in silence.
@@ -230,82 +276,46 @@ TEST(HostileWorld, EveryObjectIsThereOrNamed) {
   std::set<std::string> named;
   std::vector<WorldObject> objects;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
-    WorldObject object;
-    object.name = "object " + std::to_string(i);
-    object.frame = "world";
-    GeometryElement element;
-    element.shape = shapes[i];
-    object.geometry = {element};
-    objects.push_back(object);
+    objects.push_back(object_of("object " + std::to_string(i), shapes[i]));
   }
   for (const WorldFault& fault : builder.add(objects)) {
     EXPECT_TRUE(named.insert(fault.object).second) << fault.object;
     EXPECT_NE(fault.text.find(fault.object), std::string::npos) << fault.text;
   }
-  PosedWorld posed;
-  posed.world = builder.world();
-  posed.X_FB.assign(posed.world->frames().size(), Eigen::Isometry3d::Identity());
   std::set<std::string> there;
-  for (const auto& object : posed.world->objects()) there.insert(object.name);
+  const auto world = builder.world();
+  for (const auto& object : world->objects()) there.insert(object.name);
   for (std::size_t i = 0; i < objects.size(); ++i) {
     EXPECT_NE(there.count(objects[i].name), named.count(objects[i].name)) << objects[i].name;
   }
   EXPECT_GE(there.size(), 4U);
   EXPECT_GE(named.size(), 15U);
   // What is there has distances.
-  const auto robot = make_robot_surfaces(test::make_model({Sphere{0.05}}, 0.005));
-  std::vector<LinkProximity> results;
-  for (const auto& object : posed.world->objects()) {
-    WorldBuilder one;
-    for (const WorldObject& o : objects) {
-      if (o.name == object.name) ASSERT_TRUE(one.add({o}).empty());
-    }
-    PosedWorld alone;
-    alone.world = one.world();
-    alone.X_FB = {Eigen::Isometry3d::Identity()};
-    QueryConfig config;
-    config.max_distance = 2.0;
-    WorldQuery query(robot, config);
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-    X_FL.translation() = Eigen::Vector3d(0.03, 0.02, 0.6);
-    ASSERT_TRUE(query.run(std::vector<Eigen::Isometry3d>{X_FL}, {true}, {&alone}, TimePoint::max(),
-                          &results));
-    EXPECT_NE(results[0].state, LinkState::kUnknown) << object.name;
-    EXPECT_FALSE(std::isnan(results[0].lower_bound)) << object.name;
-    EXPECT_LT(results[0].lower_bound, 0.7) << object.name << ": " << results[0].lower_bound;
+  QueryConfig config;
+  config.max_distance = 2.0;
+  for (const WorldObject& object : objects) {
+    if (there.count(object.name) == 0) continue;
+    const LinkProximity r = answer_at({0.03, 0.02, 0.6}, config, world_of(object));
+    EXPECT_NE(r.state, LinkState::kUnknown) << object.name;
+    EXPECT_FALSE(std::isnan(r.lower_bound)) << object.name;
+    EXPECT_LT(r.lower_bound, 0.7) << object.name << ": " << r.lower_bound;
   }
 }
 
 // 0.4 + 0.3 - 0.3 is less than 0.4: an object whose margin of 0.3 m ends outside of max_distance
 // was neither clear nor near, and its link UNKNOWN.
 TEST(HostileWorld, AMarginThatRoundsMaxDistanceDownLeavesTheLinkClear) {
-  const auto robot = make_robot_surfaces(test::make_model({Sphere{0.05}}, 0.005));
+  QueryConfig config;
+  config.max_distance = 0.4;
   int cut = 0;
   for (int i = 1; i < 60; ++i) {
-    WorldObject object;
-    object.name = "box";
-    object.frame = "world";
-    GeometryElement element;
-    element.shape = Box{{0.1, 0.1, 0.1}};
-    object.geometry = {element};
+    WorldObject object = object_of("box", Box{{0.1, 0.1, 0.1}});
     object.margin = 0.01 * i;
-    QueryConfig config;
-    config.max_distance = 0.4;
     cut += config.max_distance + object.margin - object.margin < config.max_distance ? 1 : 0;
-    WorldBuilder builder;
-    ASSERT_TRUE(builder.add({object}).empty());
-    PosedWorld world;
-    world.world = builder.world();
-    world.X_FB = {Eigen::Isometry3d::Identity()};
-    WorldQuery query(robot, config);
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-    X_FL.translation().x() = 0.1 + config.max_distance + object.margin + 0.005;
-    X_FL.translation().y() = 0.1;
-    std::vector<LinkProximity> results;
-    ASSERT_TRUE(query.run(std::vector<Eigen::Isometry3d>{X_FL}, {true}, {&world}, TimePoint::max(),
-                          &results));
-    EXPECT_EQ(results[0].state, LinkState::kClear) << "margin " << object.margin;
-    EXPECT_EQ(results[0].lower_bound, config.max_distance);
+    const double x = 0.1 + config.max_distance + object.margin + 0.005;
+    const LinkProximity r = answer_at({x, 0.1, 0.0}, config, world_of(object));
+    EXPECT_EQ(r.state, LinkState::kClear) << "margin " << object.margin;
+    EXPECT_EQ(r.lower_bound, config.max_distance);
   }
   EXPECT_GT(cut, 0);
 }
@@ -325,10 +335,7 @@ TEST(HostileWorld, AFileThatNamesAnObjectTwiceIsRefused) {
 // bit of it, or in their margin or pose alone, are objects of their own.
 TEST(HostileWorld, ObjectsOfEqualGeometryShareIt) {
   const auto ball = [](const std::string& name, double radius, double x) {
-    WorldObject object;
-    object.name = name;
-    object.frame = "world";
-    object.geometry = {GeometryElement{Sphere{radius}, Eigen::Isometry3d::Identity(), "sphere"}};
+    WorldObject object = object_of(name, Sphere{radius});
     object.X_BO.translation().x() = x;
     return object;
   };

@@ -117,10 +117,41 @@ void expect_near(const LinkProximity& r, const Eigen::Isometry3d& X_FL, double t
   EXPECT_EQ(r.source, 0) << what;
 }
 
+// The answers for a scene beside its truth.
+struct Answers {
+  int near = 0, contacts = 0, clear = 0, all = 0;
+
+  void expect(const Scene& scene, std::size_t link, const LinkProximity& r,
+              const QueryConfig& config, const std::string& place) {
+    bool all_closed = true;
+    const double truth = scene.truth(link, &all_closed);
+    const std::string what =
+        "link " + std::to_string(link) + place + " truth " + std::to_string(truth);
+    ++all;
+    if (truth <= 0.0) {
+      EXPECT_LE(r.lower_bound, 0.0) << what;
+      contacts += r.state == LinkState::kContact ? 1 : 0;
+      return;
+    }
+    if (r.distance <= 0.0) {  // a face inside, through a hole
+      EXPECT_FALSE(all_closed) << what;
+      return;
+    }
+    EXPECT_LE(r.lower_bound, truth + 1e-9) << what;
+    if (r.state == LinkState::kClear) {
+      ++clear;
+      EXPECT_GE(truth, config.max_distance - 1e-9) << what;
+      return;
+    }
+    ++near;
+    expect_near(r, scene.X_FL[link], truth, config.tolerance, what);
+  }
+};
+
 TEST(WorldQuery, RandomLinksAndObjectsAgainstBruteForce) {
   Scene scene(41);
   const auto robot = make_robot_surfaces(scene.model);
-  int near = 0, contacts = 0, clear = 0, cases = 0;
+  Answers answers;
   std::vector<LinkProximity> results;
   for (const double tolerance : {0.0, 0.001, 0.005}) {
     QueryConfig config;
@@ -131,38 +162,16 @@ TEST(WorldQuery, RandomLinksAndObjectsAgainstBruteForce) {
       scene.place(trial % 4 == 0 ? 0.5 : 1.2);
       ASSERT_TRUE(query.run(scene.X_FL, scene.known, {&scene.world}, TimePoint::max(), &results));
       for (std::size_t i = 0; i < scene.links.size(); ++i) {
-        bool all_closed = true;
-        const double truth = scene.truth(i, &all_closed);
-        const LinkProximity& r = results[i];
-        const std::string what = "link " + std::to_string(i) + " trial " + std::to_string(trial) +
-                                 " truth " + std::to_string(truth);
-        ++cases;
-        if (truth <= 0.0) {
-          EXPECT_LE(r.lower_bound, 0.0) << what;
-          contacts += r.state == LinkState::kContact ? 1 : 0;
-          continue;
-        }
-        if (r.distance <= 0.0) {  // a face inside, through a hole
-          EXPECT_FALSE(all_closed) << what;
-          continue;
-        }
-        EXPECT_LE(r.lower_bound, truth + 1e-9) << what;
-        if (r.state == LinkState::kClear) {
-          ++clear;
-          EXPECT_GE(truth, config.max_distance - 1e-9) << what;
-          continue;
-        }
-        ++near;
-        expect_near(r, scene.X_FL[i], truth, tolerance, what);
+        answers.expect(scene, i, results[i], config, " trial " + std::to_string(trial));
       }
       if (HasFailure()) return;
     }
   }
   if (test::kSanitized) return;
-  EXPECT_GE(cases, 10000);
-  EXPECT_GT(near, 4000);
-  EXPECT_GT(contacts, 200);
-  EXPECT_GT(clear, 200);
+  EXPECT_GE(answers.all, 10000);
+  EXPECT_GT(answers.near, 4000);
+  EXPECT_GT(answers.contacts, 200);
+  EXPECT_GT(answers.clear, 200);
 }
 
 // What holds of a kept answer beside a fresh one.
@@ -347,27 +356,42 @@ TEST(WorldQuery, EveryLinkHasABoundWhenTheTimeIsOver) {
   if (!test::kSanitized) EXPECT_GT(unfinished, 100);
 }
 
-// A thousand balls in frames that move and turn, in groups that are placed when a link comes near:
-// the answers are those of all balls, in poses that are rigid to 1e-6 alone as well.
-TEST(WorldQuery, GroupsOfObjectsLeaveNoneOut) {
-  test::Rng rng(67);
-  constexpr int kFrames = 2, kBalls = 1000;
-  constexpr double kMargin = 0.3;  // [m] the largest
+// A thousand balls in frames that move and turn, in groups, and a robot of two balls.
+struct Balls {
+  static constexpr double kMargin = 0.3;  // [m] the largest
+  static constexpr double kPoses = 2e-6;  // [m] what poses that are rigid to 1e-6 leave open
+  test::Rng rng{67};
   std::vector<WorldObject> objects;
-  for (int i = 0; i < kBalls; ++i) {
+  PosedWorld world;
+  std::vector<std::string> frames;
+  std::uint64_t near = 0;  // answers
+  std::vector<double> radii = {0.1, 0.05};
+  std::vector<Eigen::Isometry3d> X_FL = {at(0.5, 0.0, 0.0), at(-0.5, 0.3, 0.2)};
+
+  Balls() {
+    for (int i = 0; i < 1000; ++i) objects.push_back(ball(i));
+    world = posed(objects);
+    frames = world.world->frames();
+    for (std::size_t f = 0; f < frames.size(); ++f) {
+      if (is_pair(f)) world.X_FB[f].translation() = test::random_vector(&rng, 1.0);
+    }
+  }
+  bool is_pair(std::size_t frame) const { return frames[frame].rfind("pair", 0) == 0; }
+
+  WorldObject ball(int i) {
+    const std::string number = std::to_string(i);
     const double radius = i % 250 == 0 ? 0.5 : 0.02 + 0.001 * (i % 5);
-    WorldObject one = object_of("ball" + std::to_string(i), {}, at(0.0, 0.0, 0.0));
-    one.geometry = {GeometryElement{Sphere{radius}, Eigen::Isometry3d::Identity(), "sphere"}};
+    WorldObject one = object_of("ball" + number, test::one(Sphere{radius}));
     one.geometry[0].X_LE.translation() = test::random_vector(&rng, 0.2);
     one.X_BO.translation() = test::random_vector(&rng, 4.0);
     const double angle = test::uniform(&rng, 0.0, 3.0);
     one.X_BO.rotate(Eigen::AngleAxisd(angle, test::random_vector(&rng, 1.0).normalized()));
     if (i % 7 == 0) one.X_BO.linear() *= 1.0 + 2e-7;
-    one.frame = "frame" + std::to_string(i % kFrames);
+    one.frame = "frame" + std::to_string(i % 2);
     one.margin = i % 11 == 0 ? 0.15 : 0.0;
     if (i % 13 == 0) one.allowed_links = {"link1"};
     if (i % 250 == 0) {  // a large ball alone in its group
-      one.frame = "ball" + std::to_string(i);
+      one.frame = "ball" + number;
       one.X_BO.translation() = test::random_vector(&rng, 1.5);
       one.margin = kMargin;
     }
@@ -376,73 +400,79 @@ TEST(WorldQuery, GroupsOfObjectsLeaveNoneOut) {
       one.X_BO.translation() = Eigen::Vector3d(i % 50 == 1 ? 1.0 : -1.0, 0.0, 0.0);
       one.geometry[0].X_LE.setIdentity();
     }
-    objects.push_back(one);
+    return one;
   }
-  PosedWorld world = posed(objects);
-  const std::vector<std::string> names = world.world->frames();
-  for (std::size_t f = 0; f < names.size(); ++f) {
-    if (names[f].rfind("pair", 0) == 0) {
-      world.X_FB[f].translation() = test::random_vector(&rng, 1.0);
+
+  void move(int step) {
+    for (Eigen::Isometry3d& X : X_FL) X.translation() += test::random_vector(&rng, 0.01);
+    for (std::size_t f = 0; f < world.X_FB.size(); ++f) {
+      if (test::uniform(&rng, 0, 1) < 0.3) continue;
+      const Eigen::AngleAxisd turn(is_pair(f) ? 0.1 : 0.002, Eigen::Vector3d(0.0, 0.6, 0.8));
+      world.X_FB[f] = world.X_FB[f] * turn;
+      world.X_FB[f].translation() += test::random_vector(&rng, 0.002);
+      if (f == 1) world.X_FB[f].linear() = turn.matrix() * (1.0 + (step % 2) * 3e-7);
     }
   }
-  const double radii[] = {0.1, 0.05};
-  const auto model = test::make_model({Sphere{0.1}, Sphere{0.05}}, 0.005);
-  const auto robot = make_robot_surfaces(model);
+
+  // [m] To the nearest ball, and to the nearest less its margin.
+  std::pair<double, double> truth(std::size_t link, bool may_touch) const {
+    double truth = 1e9, proven = 1e9;
+    for (const WorldObject& one : objects) {
+      if (may_touch && !one.allowed_links.empty()) continue;
+      const auto f = std::find(frames.begin(), frames.end(), one.frame) - frames.begin();
+      const Eigen::Vector3d p_FO =
+          world.X_FB[static_cast<std::size_t>(f)] * (one.X_BO * one.geometry[0].X_LE.translation());
+      const double distance = (p_FO - X_FL[link].translation()).norm() - radii[link] -
+                              std::get<Sphere>(one.geometry[0].shape).radius;
+      truth = std::min(truth, distance);
+      proven = std::min(proven, distance - one.margin);
+    }
+    return {truth, proven};
+  }
+
+  void expect(const LinkProximity& r, std::size_t link, bool may_touch, const QueryConfig& config) {
+    const auto [distance, proven] = truth(link, may_touch);
+    if (distance <= 0.0) {  // the depth of a point in both is another one
+      ASSERT_LE(r.lower_bound, kPoses);
+      return;
+    }
+    ASSERT_LE(r.lower_bound, proven + kPoses);
+    if (proven > config.max_distance + kPoses) {
+      ASSERT_EQ(r.state, LinkState::kClear);
+    } else if (proven > 0.0) {
+      const double least = std::min(proven, distance - kMargin);
+      ASSERT_GE(r.lower_bound, least - config.tolerance - kPoses);
+    }
+    if (r.state != LinkState::kNear) return;
+    ASSERT_GE(r.distance, distance - kPoses);
+    ++near;
+  }
+};
+
+// The groups are placed when a link comes near: the answers are those of all balls, in poses that
+// are rigid to 1e-6 alone as well.
+TEST(WorldQuery, GroupsOfObjectsLeaveNoneOut) {
+  Balls balls;
+  const auto model = test::make_model({Sphere{balls.radii[0]}, Sphere{balls.radii[1]}}, 0.005);
   std::vector<bool> may_touch;
   for (const LinkModel& link : model->links) may_touch.push_back(link.name == "link1");
   ASSERT_EQ(std::count(may_touch.begin(), may_touch.end(), true), 1);
   QueryConfig config;
   config.max_distance = 0.3;
-  WorldQuery query(robot, config);
-  std::vector<Eigen::Isometry3d> X_FL = {at(0.5, 0.0, 0.0), at(-0.5, 0.3, 0.2)};
-  std::uint64_t placed = 0, near = 0;
+  WorldQuery query(make_robot_surfaces(model), config);
+  std::uint64_t placed = 0;
   const int steps = test::scaled(1500);
   for (int step = 0; step < steps; ++step) {
-    for (Eigen::Isometry3d& X : X_FL) X.translation() += test::random_vector(&rng, 0.01);
-    for (std::size_t f = 0; f < world.X_FB.size(); ++f) {
-      if (test::uniform(&rng, 0, 1) < 0.3) continue;
-      const bool is_pair = names[f].rfind("pair", 0) == 0;
-      const Eigen::AngleAxisd turn(is_pair ? 0.1 : 0.002, Eigen::Vector3d(0.0, 0.6, 0.8));
-      world.X_FB[f] = world.X_FB[f] * turn;
-      world.X_FB[f].translation() += test::random_vector(&rng, 0.002);
-      if (f == 1) world.X_FB[f].linear() = turn.matrix() * (1.0 + (step % 2) * 3e-7);
-    }
+    balls.move(step);
     std::vector<LinkProximity> results;
-    query.run(X_FL, {true, true}, {&world}, TimePoint::max(), &results);
+    query.run(balls.X_FL, {true, true}, {&balls.world}, TimePoint::max(), &results);
     placed += query.statistics().objects_placed;
-    for (std::size_t i = 0; i < X_FL.size(); ++i) {
-      double truth = 1e9, proven = 1e9;
-      for (const WorldObject& one : objects) {
-        if (may_touch[i] && !one.allowed_links.empty()) continue;
-        const auto f = static_cast<std::size_t>(std::find(names.begin(), names.end(), one.frame) -
-                                                names.begin());
-        const Eigen::Vector3d p_FO =
-            world.X_FB[f] * (one.X_BO * one.geometry[0].X_LE.translation());
-        const double distance = (p_FO - X_FL[i].translation()).norm() - radii[i] -
-                                std::get<Sphere>(one.geometry[0].shape).radius;
-        truth = std::min(truth, distance);
-        proven = std::min(proven, distance - one.margin);
-      }
-      constexpr double kPoses = 2e-6;  // [m] what such poses leave open
-      const LinkProximity& r = results[i];
-      if (truth <= 0.0) {  // the depth of a point in both is another one
-        ASSERT_LE(r.lower_bound, kPoses) << step;
-        continue;
-      }
-      ASSERT_LE(r.lower_bound, proven + kPoses) << step;
-      if (proven > config.max_distance + kPoses) {
-        ASSERT_EQ(r.state, LinkState::kClear) << step;
-      } else if (proven > 0.0) {
-        const double least = std::min(proven, truth - kMargin);
-        ASSERT_GE(r.lower_bound, least - config.tolerance - kPoses) << step;
-      }
-      if (r.state == LinkState::kNear) {
-        ASSERT_GE(r.distance, truth - kPoses) << step;
-        ++near;
-      }
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      balls.expect(results[i], i, may_touch[i], config);
+      ASSERT_FALSE(HasFatalFailure()) << step;
     }
   }
-  EXPECT_GT(near, static_cast<std::uint64_t>(steps) / 4);
+  EXPECT_GT(balls.near, static_cast<std::uint64_t>(steps) / 4);
   EXPECT_GT(placed, 0U);
 }
 
