@@ -16,6 +16,7 @@
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/random_links.h"
+#include "support/random_numbers.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/trial.h"
@@ -203,53 +204,70 @@ TEST(StoppedBounds, WhatAMeshWithHolesEnclosesMayBeDeeperThanItsSphere) {
   EXPECT_GT(inside, 9);
 }
 
+// A link that moves among points, asked with deadlines that mostly leave it unfinished.
+struct StoppedLink {
+  LinkGeometry link;
+  ProximityQuery query;
+  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  int known = 0, unfinished = 0;
+
+  void expect_bound(const LinkProximity& result, const Points& points, const CloudSnapshot& cloud) {
+    if (result.state < LinkState::kNear) return;
+    ++known;
+    ASSERT_TRUE(std::isfinite(result.lower_bound));
+    ASSERT_TRUE(std::isfinite(result.sensor_width));
+    const test::Truth truth = test::truth_of(link, X_FL, points, cloud);
+    ASSERT_LE(result.lower_bound, std::max(truth.measured, truth.stored) + 2e-8);
+    const double width = result.distance - result.lower_bound - result.sensor_width;
+    if (width <= query.config().tolerance + 1e-6) return;
+    ++unfinished;
+    ASSERT_EQ(query.statistics().unfinished, 1U);
+    ASSERT_GE(query.statistics().widest, width - 1e-12);
+  }
+
+  void expect_round(bool has_extent, test::Rng* rng) {
+    Points points;
+    for (int k = 0; k < 400; ++k) points.push_back(test::random_vector(rng, 0.12));
+    CloudSnapshot cloud = test::make_snapshot(points);
+    if (has_extent) {
+      cloud.extent.constant = cloud.extent.linear = 0.01;
+      cloud.extent.max_range = 5.0;
+      cloud.extent.p_FS = Eigen::Vector3d::UnitX();
+    }
+    for (int step = 0; step < 8; ++step) {
+      QueryConfig config;
+      config.deadline = test::power_of_ten(rng, -5.5, -3.5);
+      query.set_config(config);
+      std::vector<LinkProximity> results;
+      query.run({X_FL}, {true}, {&cloud}, &results);
+      expect_bound(results.front(), points, cloud);
+      if (testing::Test::HasFatalFailure()) return;
+      X_FL = X_FL * test::random_pose(rng, 0.001);
+      X_FL.translation() *= 0.9;
+    }
+  }
+};
+
 TEST(StoppedBounds, AKnownLinkHasAFiniteBound) {
   test::Rng rng(21);
-  int known_links = 0, unfinished = 0;
+  int known = 0, unfinished = 0;
   for (const TriangleMesh& mesh :
        {test::moebius_strip(0.1, 0.04, 20), test::open_box({0.1, 0.1, 0.1})}) {
     const LinkGeometry link = test::one(mesh);
     for (const auto& model : models_of(link)) {
       for (const bool has_extent : {false, true}) {
-        ProximityQuery query(model, {});
-        Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+        StoppedLink stopped{link, ProximityQuery(model, {})};
         for (int round = 0; round < test::scaled(40); ++round) {
-          std::vector<Eigen::Vector3d> points;
-          for (int k = 0; k < 400; ++k) points.push_back(test::random_vector(&rng, 0.12));
-          CloudSnapshot cloud = test::make_snapshot(points);
-          if (has_extent) {
-            cloud.extent.constant = cloud.extent.linear = 0.01;
-            cloud.extent.max_range = 5.0;
-            cloud.extent.p_FS = Eigen::Vector3d::UnitX();
-          }
-          for (int step = 0; step < 8; ++step) {
-            QueryConfig config;
-            config.deadline = std::pow(10.0, test::uniform(&rng, -5.5, -3.5));
-            query.set_config(config);
-            std::vector<LinkProximity> results;
-            query.run({X_FL}, {true}, {&cloud}, &results);
-            const LinkProximity& result = results.front();
-            if (result.state >= LinkState::kNear) {
-              ++known_links;
-              ASSERT_TRUE(std::isfinite(result.lower_bound)) << "round " << round;
-              ASSERT_TRUE(std::isfinite(result.sensor_width)) << "round " << round;
-              const test::Truth truth = test::truth_of(link, X_FL, points, cloud);
-              ASSERT_LE(result.lower_bound, std::max(truth.measured, truth.stored) + 2e-8);
-              const double width = result.distance - result.lower_bound - result.sensor_width;
-              if (width > config.tolerance + 1e-6) {
-                ++unfinished;
-                ASSERT_EQ(query.statistics().unfinished, 1U);
-                ASSERT_GE(query.statistics().widest, width - 1e-12);
-              }
-            }
-            X_FL = X_FL * test::random_pose(&rng, 0.001);
-            X_FL.translation() *= 0.9;
-          }
+          SCOPED_TRACE(testing::Message() << "round " << round);
+          stopped.expect_round(has_extent, &rng);
+          if (HasFatalFailure()) return;
         }
+        known += stopped.known;
+        unfinished += stopped.unfinished;
       }
     }
   }
-  EXPECT_GT(known_links, test::scaled(1000));
+  EXPECT_GT(known, test::scaled(1000));
   EXPECT_GT(unfinished, 10);
 }
 

@@ -187,58 +187,82 @@ TEST(RayCast, nearestApproachIsThatOfTheLine) {
   }
 }
 
-// The rays of a tile of pixels: what the bundle says of each is what a search for it alone says.
-// Sensors stand inside, near and up to 30 m away; the pixels are up to 0.1 rad apart.
+// Solids of one mesh; of more leaves than a bundle has room for, of several elements, and of more
+// of these than it can list.
+std::vector<Solid> solids_for_bundles(Random* random) {
+  std::vector<Solid> solids;
+  for (const NamedMesh& m : meshes()) {
+    solids.push_back(Solid({element(m.mesh, random_pose(random))}));
+  }
+  solids.push_back(Solid({element(test::icosphere(0.15, 6), random_pose(random))}));
+  solids.push_back(Solid({element(test::torus(0.15, 0.04, 48, 24), random_pose(random)),
+                          element(Box{{0.1, 0.2, 0.3}}, random_pose(random)),
+                          element(Sphere{0.1}, random_pose(random)),
+                          element(Cylinder{0.05, 0.3}, random_pose(random))}));
+  std::vector<GeometryElement> many;
+  for (int i = 0; i < 20; ++i) many.push_back(element(Sphere{0.03}, random_pose(random)));
+  solids.push_back(Solid(many));
+  return solids;
+}
+
+// The rays of a tile of pixels. Sensors stand inside, near and up to 30 m away; the pixels are up
+// to 0.1 rad apart. Some pixels may be no numbers, and rays may be cast in two parts.
+struct Tile {
+  Eigen::Vector3d origin;
+  RayBundle::Directions directions;
+  std::uint32_t rays, early;
+  double max_t;
+
+  bool has(std::uint32_t k) const { return (rays >> k & 1U) != 0; }
+};
+
+Tile random_tile(Random* random, int i) {
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  Tile tile;
+  const double range = std::pow(10.0, -1.5 + 1.5 * (u(*random) + 1.0));
+  const double apart = std::pow(10.0, -4.0 + 1.5 * (u(*random) + 1.0));
+  tile.origin = range * random_direction(random);
+  const Eigen::Vector3d aim = 0.25 * random_direction(random) - tile.origin;
+  const double length = i % 2 == 0 ? 1.0 : aim.norm();
+  for (int k = 0; k < 16; ++k) {
+    tile.directions.col(k) = length * (aim.normalized() + apart * random_direction(random));
+  }
+  tile.rays = i % 5 == 0 ? 0xFFFFU : (*random)() & 0xFFFFU;
+  tile.early = i % 7 == 0 ? 0U : (*random)() & tile.rays;
+  for (std::uint32_t k = 0; k < 16; ++k) {
+    if (!tile.has(k)) tile.directions.col(k).setConstant(std::nan(""));
+  }
+  tile.max_t = i % 3 == 0 ? kInf : aim.norm() / length;
+  return tile;
+}
+
+std::array<double, RayBundle::kRays> random_limits(Random* random, double max_t) {
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  std::array<double, RayBundle::kRays> limits;
+  for (double& limit : limits) {
+    limit = std::isfinite(max_t) ? 0.5 * (u(*random) + 1.0) * max_t : max_t;
+  }
+  return limits;
+}
+
+// What the bundle says of each ray is what a search for it alone says.
 TEST(RayBundle, agreesWithSingleRays) {
   Random random(5);
-  std::uniform_real_distribution<double> u(-1.0, 1.0);
-  std::vector<std::vector<GeometryElement>> solids;
-  for (const NamedMesh& m : meshes()) {
-    solids.push_back({element(m.mesh, random_pose(&random))});
-  }
-  // More leaves than a bundle has room for, several elements, and more of these than it can list.
-  solids.push_back({element(test::icosphere(0.15, 6), random_pose(&random))});
-  solids.push_back({element(test::torus(0.15, 0.04, 48, 24), random_pose(&random)),
-                    element(Box{{0.1, 0.2, 0.3}}, random_pose(&random)),
-                    element(Sphere{0.1}, random_pose(&random)),
-                    element(Cylinder{0.05, 0.3}, random_pose(&random))});
-  std::vector<GeometryElement> many;
-  for (int i = 0; i < 20; ++i) many.push_back(element(Sphere{0.03}, random_pose(&random)));
-  solids.push_back(many);
-
   RayBundle bundle;
   int hits = 0, misses = 0, empty = 0;
-  for (const std::vector<GeometryElement>& elements : solids) {
-    const Solid solid(elements);
+  for (const Solid& solid : solids_for_bundles(&random)) {
     for (int i = 0; i < 1600; ++i) {
-      const double range = std::pow(10.0, -1.5 + 1.5 * (u(random) + 1.0));
-      const double apart = std::pow(10.0, -4.0 + 1.5 * (u(random) + 1.0));
-      const Eigen::Vector3d origin = range * random_direction(&random);
-      const Eigen::Vector3d aim = 0.25 * random_direction(&random) - origin;
-      const double length = i % 2 == 0 ? 1.0 : aim.norm();
-      RayBundle::Directions directions;
-      for (int k = 0; k < 16; ++k) {
-        directions.col(k) = length * (aim.normalized() + apart * random_direction(&random));
-      }
-      // Some pixels may be no numbers, and rays may be cast in two parts.
-      const std::uint32_t rays = i % 5 == 0 ? 0xFFFFU : random() & 0xFFFFU,
-                          early = i % 7 == 0 ? 0U : random() & rays;
-      for (std::uint32_t k = 0; k < 16; ++k) {
-        if ((rays >> k & 1U) == 0) directions.col(k).setConstant(std::nan(""));
-      }
-      const double max_t = i % 3 == 0 ? kInf : aim.norm() / length;
+      const Tile tile = random_tile(&random, i);
+      const auto limits = random_limits(&random, tile.max_t);
       const long before = test::allocations;
-      bundle.begin(solid, origin, directions, rays, max_t);
+      bundle.begin(solid, tile.origin, tile.directions, tile.rays, tile.max_t);
       empty += bundle.empty() ? 1 : 0;
-      std::array<double, RayBundle::kRays> limits;
-      for (double& limit : limits)
-        limit = std::isfinite(max_t) ? 0.5 * (u(random) + 1.0) * max_t : max_t;
       std::array<RayHit, RayBundle::kRays> found;
-      bundle.cast(early, limits, &found);
-      bundle.cast(rays & ~early, limits, &found);
+      bundle.cast(tile.early, limits, &found);
+      bundle.cast(tile.rays & ~tile.early, limits, &found);
       for (std::uint32_t k = 0; k < 16; ++k) {
-        if ((rays >> k & 1U) == 0) continue;
-        const RayHit alone = ray_cast(solid, origin, directions.col(k), limits[k]);
+        if (!tile.has(k)) continue;
+        const RayHit alone = ray_cast(solid, tile.origin, tile.directions.col(k), limits[k]);
         const RayHit& hit = found[k];
         ASSERT_EQ(std::isfinite(hit.t), std::isfinite(alone.t));
         (std::isfinite(hit.t) ? hits : misses) += 1;

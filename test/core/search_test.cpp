@@ -11,6 +11,7 @@
 #include "support/distance_fields.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/random_numbers.h"
 #include "support/sanitizers.h"
 #include "support/trial.h"
 
@@ -117,52 +118,66 @@ Eigen::Isometry3d step_of(test::Rng* rng, double length) {
   return Eigen::Translation3d(way) * Eigen::AngleAxisd(3.0 * length, axis);
 }
 
-// Links with and without holes move among points, mostly slowly, sometimes back, sometimes far, and
-// the cloud changes now and then. Deadlines leave parts of searches undone.
+std::vector<Eigen::Vector3d> random_cluster(test::Rng* rng) {
+  const Eigen::Vector3d middle = test::random_vector(rng, 0.3);
+  std::vector<Eigen::Vector3d> points;
+  for (int k = 0; k < 400; ++k) points.push_back(middle + test::random_vector(rng, 0.2));
+  return points;
+}
+
+struct Answers {
+  int all = 0, near = 0, contacts = 0;
+};
+
+// A link moves among points, mostly slowly, sometimes back, sometimes far, and the cloud changes
+// now and then. Deadlines leave parts of searches undone.
+void expect_motion(const std::shared_ptr<const RobotModel>& model, std::size_t link,
+                   const LinkGeometry& geometry, double tolerance, test::Rng* rng,
+                   Answers* answers) {
+  QueryConfig config;
+  config.tolerance = tolerance;
+  ProximityQuery query(model, config);
+  std::vector<Eigen::Vector3d> points;
+  CloudSnapshot cloud;
+  Eigen::Isometry3d X_FL = test::random_pose(rng, 0.1);
+  const int steps = std::max(test::scaled(120), 8);
+  for (int step = 0; step < steps; ++step) {
+    if (step % 40 == 0) {
+      points = random_cluster(rng);
+      cloud = test::make_snapshot(points);
+    }
+    X_FL = X_FL * step_of(rng, test::power_of_ten(rng, -6.0, step % 10 == 9 ? -1.0 : -3.0));
+    config.deadline = step % 7 == 6 ? 1e-6 : 0.0;
+    query.set_config(config);
+    LinkProximity result;
+    SCOPED_TRACE(testing::Message() << "link " << link << ", step " << step);
+    const test::Truth truth = test::truth_of(geometry, X_FL, points, cloud);
+    if (query.run_link(link, X_FL, {&cloud}, &result)) {
+      test::expect_truth(result, truth, config, X_FL, kRounding);
+    } else {
+      EXPECT_LE(result.lower_bound, std::max(truth.measured, truth.stored) + kRounding);
+    }
+    if (testing::Test::HasFailure()) return;
+    ++answers->all;
+    answers->near += result.state == LinkState::kNear ? 1 : 0;
+    answers->contacts += result.state == LinkState::kContact ? 1 : 0;
+  }
+}
+
 TEST(SearchFront, AnswersHoldAlongAMotion) {
   test::Rng rng(11);
   std::vector<LinkGeometry> links = test::random_links(&rng);
   links.push_back(test::one(test::open_box({0.2, 0.2, 0.2})));
   const auto model = test::with_fields(test::model_of(links, 0.02));
-  int answers = 0, near = 0, contacts = 0;
+  Answers answers;
   for (std::size_t i = 0; i < links.size(); ++i) {
     for (const double tolerance : {0.0, 0.001}) {
-      QueryConfig config;
-      config.tolerance = tolerance;
-      ProximityQuery query(model, config);
-      std::vector<Eigen::Vector3d> points;
-      CloudSnapshot cloud;
-      Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.1);
-      const int steps = std::max(test::scaled(120), 8);
-      for (int step = 0; step < steps; ++step) {
-        if (step % 40 == 0) {
-          points.clear();
-          const Eigen::Vector3d middle = test::random_vector(&rng, 0.3);
-          for (int k = 0; k < 400; ++k) points.push_back(middle + test::random_vector(&rng, 0.2));
-          cloud = test::make_snapshot(points);
-        }
-        const double length =
-            std::pow(10.0, test::uniform(&rng, -6.0, step % 10 == 9 ? -1.0 : -3.0));
-        X_FL = X_FL * step_of(&rng, length);
-        config.deadline = step % 7 == 6 ? 1e-6 : 0.0;
-        query.set_config(config);
-        LinkProximity result;
-        SCOPED_TRACE(testing::Message() << "link " << i << ", step " << step);
-        const test::Truth truth = test::truth_of(links[i], X_FL, points, cloud);
-        if (query.run_link(i, X_FL, {&cloud}, &result)) {
-          test::expect_truth(result, truth, config, X_FL, kRounding);
-        } else {
-          EXPECT_LE(result.lower_bound, std::max(truth.measured, truth.stored) + kRounding);
-        }
-        if (HasFailure()) return;
-        ++answers;
-        near += result.state == LinkState::kNear ? 1 : 0;
-        contacts += result.state == LinkState::kContact ? 1 : 0;
-      }
+      expect_motion(model, i, links[i], tolerance, &rng, &answers);
+      if (HasFailure()) return;
     }
   }
-  EXPECT_GT(5 * near, answers);
-  EXPECT_GT(20 * contacts, answers);
+  EXPECT_GT(5 * answers.near, answers.all);
+  EXPECT_GT(20 * answers.contacts, answers.all);
 }
 
 // A box dips into a plane of points, a little tilted otherwise each time: a point that was inside
