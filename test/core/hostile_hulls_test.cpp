@@ -94,6 +94,17 @@ Eigen::Isometry3d next_pose(test::Rng* rng, const Body& a, const Body& b,
   return X;
 }
 
+// [m] Of the corners, from the pose that the search refers to.
+double motion_of(const Body& a, const SurfacePairSearch& search, const Eigen::Isometry3d& X_BA) {
+  double moved = 0.0;
+  for (const ConvexPart& part : a.bvh.parts()) {
+    for (const Eigen::Vector3d& p : {part.a, part.b, part.c}) {
+      moved = std::max(moved, (X_BA * p - search.reference_pose() * p).norm());
+    }
+  }
+  return moved;
+}
+
 TEST(HostileHulls, BoundsHold) {
   test::Rng rng(2321);
   int apart = 0, touching = 0, near = 0;
@@ -108,16 +119,8 @@ TEST(HostileHulls, BoundsHold) {
       X_BA = next_pose(&rng, a, b, search, X_BA);
       const double scale = 1.0 + a.bvh.extent() + b.bvh.extent() + X_BA.translation().norm();
       // What moves is not bounded here: every second pose is searched anew.
-      double moved = std::numeric_limits<double>::infinity();
-      if (step % 2 == 1) {
-        moved = 0.0;
-        for (const ConvexPart& part : a.bvh.parts()) {
-          for (const Eigen::Vector3d& p : {part.a, part.b, part.c}) {
-            moved = std::max(moved, (X_BA * p - search.reference_pose() * p).norm());
-          }
-        }
-        moved += 1e-12 * scale;
-      }
+      const double moved = step % 2 == 1 ? motion_of(a, search, X_BA) + 1e-12 * scale
+                                         : std::numeric_limits<double>::infinity();
       search.move_to(X_BA, moved);
       constexpr double kTolerances[] = {0.0, 1e-6, 1e-3, 0.02};
       const double tolerance = kTolerances[test::below(&rng, 4)];
@@ -137,8 +140,7 @@ TEST(HostileHulls, BoundsHold) {
             << where << ", distance " << search.distance() << ", truth " << truth << ", bound "
             << search.lower_bound() << ", tolerance " << tolerance << ", steps " << steps;
       }
-      apart += truth > rounding ? 1 : 0;
-      touching += truth <= rounding ? 1 : 0;
+      ++(truth > rounding ? apart : touching);
       near += truth > rounding && truth < 1e-4 ? 1 : 0;
     }
   }
@@ -176,6 +178,14 @@ std::vector<TriangleMesh> meshes(test::Rng* rng) {
           degenerate(rng, 1),         degenerate(rng, 2)};
 }
 
+// Some faces and edges are parallel, and some middles in one place.
+Eigen::Isometry3d random_pose(test::Rng* rng, int n) {
+  Eigen::Isometry3d X = test::random_pose(rng, 0.3);
+  if (n % 5 == 0) X.linear().setIdentity();
+  if (n % 7 == 0) X.translation().setZero();
+  return X;
+}
+
 // Never above the distance of any two triangles, from any start; and for convex meshes that
 // distance.
 TEST(HullDistance, IsALowerBoundAndTightForConvexMeshes) {
@@ -190,9 +200,7 @@ TEST(HullDistance, IsALowerBoundAndTightForConvexMeshes) {
       const test::TriangleGroups groups_b(test::triangles_of(test::one(all[k])));
       HullSupport support;
       for (int n = 0; n < test::scaled(30); ++n) {
-        Eigen::Isometry3d X_BA = test::random_pose(&rng, 0.3);
-        if (n % 5 == 0) X_BA.linear().setIdentity();  // parallel faces and edges
-        if (n % 7 == 0) X_BA.translation().setZero();
+        const Eigen::Isometry3d X_BA = random_pose(&rng, n);
         const double truth = groups_b.distance(groups_a, X_BA);
         if (n % 3 == 0) support = {};
         const HullDistance found = hull_distance(a, b, X_BA, 1e-9, &support);

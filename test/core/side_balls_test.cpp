@@ -94,6 +94,16 @@ Eigen::Vector3d surface_point(const TriangleMesh& mesh, test::Rng* rng) {
   return a * mesh.corner(t, 0) + b * mesh.corner(t, 1) + (1.0 - a - b) * mesh.corner(t, 2);
 }
 
+// Of three kinds, of a size [m], about the origin or as far as 10 m from it.
+TriangleMesh random_mesh(test::Rng* rng, int number, double size) {
+  TriangleMesh mesh = number % 3 == 0   ? test::box({1.0, 0.6, 0.8})
+                      : number % 3 == 1 ? test::random_lump(rng)
+                                        : test::torus(0.4, 0.1, 16, 8);
+  const double scale = size / test::bounds(mesh).sizes().maxCoeff();
+  for (Eigen::Vector3d& v : mesh.vertices) v *= scale;
+  return test::moved(mesh, test::random_pose(rng, number % 2 == 0 ? 0.0 : 10.0));
+}
+
 // Float moves the corners of a mesh of 10 m by half a micrometre: up to 1 um from the surface its
 // winding number told the wrong side.
 TEST(Sides, AreThoseOfDoublePrecisionHoweverLargeTheMesh) {
@@ -101,12 +111,7 @@ TEST(Sides, AreThoseOfDoublePrecisionHoweverLargeTheMesh) {
   int inside = 0, outside = 0;
   for (const double size : {1.0, 3.0, 10.0}) {
     for (int m = 0; m < 12; ++m) {
-      TriangleMesh mesh = m % 3 == 0   ? test::box({1.0, 0.6, 0.8})
-                          : m % 3 == 1 ? test::random_lump(&rng)
-                                       : test::torus(0.4, 0.1, 16, 8);
-      const double scale = size / test::bounds(mesh).sizes().maxCoeff();
-      for (Eigen::Vector3d& v : mesh.vertices) v *= scale;
-      mesh = test::moved(mesh, test::random_pose(&rng, m % 2 == 0 ? 0.0 : 10.0));
+      const TriangleMesh mesh = random_mesh(&rng, m, size);
       const auto model = test::model_of({test::one(mesh)}, 0.2 * size);
       const Solid& solid = model->links[0].solid;
       ProximityQuery query(model, QueryConfig());

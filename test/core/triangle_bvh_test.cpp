@@ -141,6 +141,17 @@ TEST(TriangleBvh, WindingNumberEqualsTheSumOverAllTriangles) {
   }
 }
 
+// A sphere that is cut open.
+TriangleMesh cut_sphere(double radius) {
+  TriangleMesh sphere = test::icosphere(radius, 3);
+  const auto is_cut_off = [&](const TriangleMesh::Triangle& triangle) {
+    return sphere.vertices[triangle[0]].z() > 0.06;
+  };
+  auto& triangles = sphere.triangles;
+  triangles.erase(std::remove_if(triangles.begin(), triangles.end(), is_cut_off), triangles.end());
+  return sphere;
+}
+
 // Where sheets lie one on another, or one in another, the errors of the expansion add up.
 TEST(TriangleBvh, ErrorOfTheQuickWindingNumberGrowsWithTheSheets) {
   test::Rng rng(28);
@@ -150,15 +161,7 @@ TEST(TriangleBvh, ErrorOfTheQuickWindingNumberGrowsWithTheSheets) {
     for (const int sheets : {1, 2, 8}) {
       TriangleMesh mesh;
       for (int i = 0; i < sheets; ++i) {
-        // A sphere that is cut open.
-        const TriangleMesh sphere = test::icosphere(0.1 * (1.0 - step * i), 3);
-        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-        mesh.vertices.insert(mesh.vertices.end(), sphere.vertices.begin(), sphere.vertices.end());
-        for (TriangleMesh::Triangle triangle : sphere.triangles) {
-          if (sphere.vertices[triangle[0]].z() > 0.06) continue;
-          for (auto& vertex : triangle) vertex += first;
-          mesh.triangles.push_back(triangle);
-        }
+        mesh = test::joined(mesh, cut_sphere(0.1 * (1.0 - step * i)));
       }
       const TriangleBvh bvh(mesh);
       for (int i = 0; i < test::scaled(400); ++i) {
