@@ -42,6 +42,44 @@ TileView::Sight nearest_surface(const std::vector<const SelfFilter::Link*>& link
   return nearest;
 }
 
+// Bodies about a place 1 m away, and the first of them once more.
+std::vector<PosedSolid> random_solids(const std::vector<LinkModel>& bodies,
+                                      std::mt19937_64* random) {
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  std::vector<PosedSolid> solids;
+  for (std::size_t i = 0; i <= bodies.size(); ++i) {
+    const LinkModel& body = bodies[i % bodies.size()];
+    Eigen::Isometry3d X_FL(Eigen::AngleAxisd(3.0 * u(*random), random_direction(random)));
+    X_FL.translation() = Eigen::Vector3d(0.0, 0.0, 1.0) + 0.12 * random_direction(random);
+    solids.push_back({&body.tree, &body.solid, X_FL});
+  }
+  solids.back().X_FL = solids.front().X_FL;
+  return solids;
+}
+
+// Points with noise on what is seen first, before it, or on a wall.
+std::array<float, 3 * kPixels> random_points(const std::vector<const SelfFilter::Link*>& links,
+                                             const std::vector<Eigen::Isometry3d>& X_LS,
+                                             double noise, std::mt19937_64* random) {
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  const Eigen::Vector3d aim = Eigen::Vector3d(0.25 * u(*random), 0.25 * u(*random), 1.0);
+  constexpr double kApart = 0.003;
+  std::array<float, 3 * kPixels> xyz;
+  for (std::size_t k = 0; k < kPixels; ++k) {
+    const Eigen::Vector3d pixel(static_cast<double>(k % kTileSide),
+                                static_cast<double>(k / kTileSide), 0.0);
+    const Eigen::Vector3d d = (aim + kApart * pixel).normalized();
+    double t = 1.6;
+    for (const SelfFilter::Link* link : links) {
+      const Eigen::Isometry3d& X = X_LS[link->number];
+      t = std::min(t, ray_cast(*link->solid, X.translation(), X.linear() * d, kInf).t);
+    }
+    const Eigen::Vector3f p = ((t + noise * u(*random)) * d).cast<float>();
+    std::copy(p.data(), p.data() + 3, xyz.begin() + static_cast<std::ptrdiff_t>(3 * k));
+  }
+  return xyz;
+}
+
 // Links that overlap, one of them twice in the same place, and points on, beside and between them:
 // the sights are those of all links, whichever link is looked at first, and however many rays at a
 // time.
@@ -51,21 +89,11 @@ TEST(TileView, SightsAreThoseOfAllLinksInAnyOrder) {
                                       0.01);
   const std::vector<LinkModel>& bodies = model->links;
   std::mt19937_64 random(7);
-  std::uniform_real_distribution<double> u(-1.0, 1.0);
   TileView view;
   view.reserve(bodies.size() + 1);
   int hits = 0, misses = 0, equal = 0;
   for (int scene = 0; scene < 3000; ++scene) {
-    std::vector<PosedSolid> solids;
-    for (std::size_t i = 0; i <= bodies.size(); ++i) {
-      PosedSolid posed;
-      posed.tree = &bodies[i % bodies.size()].tree;
-      posed.solid = &bodies[i % bodies.size()].solid;
-      posed.X_FL = Eigen::Isometry3d(Eigen::AngleAxisd(3.0 * u(random), random_direction(&random)));
-      posed.X_FL.translation() = Eigen::Vector3d(0.0, 0.0, 1.0) + 0.12 * random_direction(&random);
-      if (i == bodies.size()) posed.X_FL = solids.front().X_FL;
-      solids.push_back(posed);
-    }
+    const std::vector<PosedSolid> solids = random_solids(bodies, &random);
     SelfFilter filter;
     filter.set_poses(solids, Eigen::Isometry3d::Identity(), 0.02);
     PaddedBox everything;
@@ -77,23 +105,8 @@ TEST(TileView, SightsAreThoseOfAllLinksInAnyOrder) {
     std::vector<Eigen::Isometry3d> X_LS;
     for (const PosedSolid& posed : solids) X_LS.push_back(posed.X_FL.inverse());
 
-    // Points with noise on what is seen first, before it, or on a wall.
-    const Eigen::Vector3d aim = Eigen::Vector3d(0.25 * u(random), 0.25 * u(random), 1.0);
-    const double apart = 0.003, noise = scene % 3 == 0 ? 0.0 : 0.02;
-    std::array<float, 3 * kPixels> xyz;
-    for (std::size_t k = 0; k < kPixels; ++k) {
-      const Eigen::Vector3d d =
-          (aim + apart * Eigen::Vector3d(static_cast<double>(k % kTileSide),
-                                         static_cast<double>(k / kTileSide), 0.0))
-              .normalized();
-      double t = 1.6;
-      for (const SelfFilter::Link* link : links) {
-        const Eigen::Isometry3d& X = X_LS[link->number];
-        t = std::min(t, ray_cast(*link->solid, X.translation(), X.linear() * d, kInf).t);
-      }
-      const Eigen::Vector3f p = ((t + noise * u(random)) * d).cast<float>();
-      std::copy(p.data(), p.data() + 3, xyz.begin() + static_cast<std::ptrdiff_t>(3 * k));
-    }
+    const double noise = scene % 3 == 0 ? 0.0 : 0.02;
+    const std::array<float, 3 * kPixels> xyz = random_points(links, X_LS, noise, &random);
     const std::uint32_t kept = scene % 2 == 0 ? 0xFFFFU : (random() & 0xFFFFU) | 1U;
     const std::uint32_t early = random() & kept;
     const double behind = 0.05;

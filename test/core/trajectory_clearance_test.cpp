@@ -197,6 +197,22 @@ TEST(TrajectoryClearance, brakingTakesWhatJointsCan) {
   EXPECT_LT(least_rest, 0.1);
 }
 
+// The earliest contact of all links, and the smallest bound.
+LinkClearance clearance_of(TimeOfImpact* impacts, const StraightPieces& pieces, const Scene& scene,
+                           const Watch& watch, const CloudSnapshot& cloud, std::size_t links) {
+  std::vector<LinkClearance> found;
+  impacts->run(pieces, watch.from, scene.motion.still, scene.motion.X_FR,
+               std::vector<bool>(links, true), {&cloud}, {}, watch.speed, watch.age, &found);
+  LinkClearance all;
+  all.contact_time = kInf;
+  for (const LinkClearance& one : found) {
+    EXPECT_FALSE(std::isnan(one.contact_time));
+    all.contact_time = std::min(all.contact_time, one.contact_time);
+    all.lower_bound = std::fmin(all.lower_bound, one.lower_bound);
+  }
+  return all;
+}
+
 TEST(TrajectoryClearance, neverLateAndHardlyEarly) {
   test::Rng rng(6);
   constexpr double kFar = 3.0;  // [m]
@@ -213,45 +229,27 @@ TEST(TrajectoryClearance, neverLateAndHardlyEarly) {
         return test::sampled_distance(arm, scene.at(time), 0.5) - watch.come(time);
       };
       const CloudSnapshot cloud = test::make_snapshot(scene.motion.points);
-      std::vector<LinkClearance> found;
-      impacts.run(straight_pieces(scene.path), watch.from, scene.motion.still, scene.motion.X_FR,
-                  std::vector<bool>(arm.size(), true), {&cloud}, {}, watch.speed, watch.age,
-                  &found);
-      LinkClearance all;
-      all.contact_time = kInf;
-      double earliest = kInf;
-      for (const LinkClearance& one : found) {
-        ASSERT_FALSE(std::isnan(one.contact_time));
-        all.contact_time = std::min(all.contact_time, one.contact_time);
-        all.lower_bound = std::fmin(all.lower_bound, one.lower_bound);
-      }
-      const Sampled truth = sample(arm, scene, watch);
+      const LinkClearance all =
+          clearance_of(&impacts, straight_pieces(scene.path), scene, watch, cloud, arm.size());
       // Pieces that are far from the polynomials are early, and not wrong.
-      std::vector<LinkClearance> coarse;
-      impacts.run(straight_pieces(scene.path, 0.1), watch.from, scene.motion.still,
-                  scene.motion.X_FR, std::vector<bool>(arm.size(), true), {&cloud}, {}, watch.speed,
-                  watch.age, &coarse);
-      for (const LinkClearance& one : coarse) {
-        earliest = std::min(earliest, one.contact_time);
-      }
-      ASSERT_LE(earliest, truth.contact) << "late";
+      const LinkClearance coarse =
+          clearance_of(&impacts, straight_pieces(scene.path, 0.1), scene, watch, cloud, arm.size());
+      const Sampled truth = sample(arm, scene, watch);
+      ASSERT_LE(coarse.contact_time, truth.contact) << "late";
       ASSERT_LE(all.contact_time, truth.contact) << "late";
       const double until =
           all.contact_time < kInf ? std::max(distance(all.contact_time), 0.0) : truth.least;
       ASSERT_LE(all.lower_bound, until + 1e-9) << "too far";
       ++trajectories;
-      if (truth.contact < kInf) {
-        ++contacts;
-        const bool is_in_time = truth.contact - all.contact_time <= 0.02;
-        const bool is_near = distance(all.contact_time) <= 0.005;
-        close += is_in_time || is_near ? 1 : 0;
-      } else {
-        ++free;
-        const bool is_near = all.contact_time < kInf && distance(all.contact_time) <= 0.005;
-        close += all.contact_time == kInf || is_near ? 1 : 0;
-        const double least = std::min(truth.least, kFar);
-        tight += all.lower_bound >= std::min(0.75 * least, least - 0.002) - 0.012 ? 1 : 0;
-      }
+      const bool is_in_time =
+          all.contact_time == truth.contact || truth.contact - all.contact_time <= 0.02;
+      const bool is_near = all.contact_time < kInf && until <= 0.005;
+      close += is_in_time || is_near ? 1 : 0;
+      contacts += truth.contact < kInf ? 1 : 0;
+      if (truth.contact < kInf) continue;
+      ++free;
+      const double least = std::min(truth.least, kFar);
+      tight += all.lower_bound >= std::min(0.75 * least, least - 0.002) - 0.012 ? 1 : 0;
     }
   }
   EXPECT_GE(close, 0.99 * trajectories);
