@@ -66,6 +66,16 @@ Cloud random_cloud(test::Rng* rng, const LinkGeometry& link, int count) {
   return cloud;
 }
 
+std::vector<Cloud> random_clouds(test::Rng* rng, const LinkGeometry& link) {
+  std::vector<Cloud> clouds;
+  const int count = 1 + static_cast<int>(test::uniform(rng, 0, 3.5));
+  for (int k = 0; k < count; ++k) {
+    const int size = 1 + static_cast<int>(std::pow(test::uniform(rng, 0, 1), 3) * 100);
+    clouds.push_back(random_cloud(rng, link, size));
+  }
+  return clouds;
+}
+
 double truth_of(const LinkGeometry& link, const Eigen::Isometry3d& X_FL,
                 const std::vector<Cloud>& clouds) {
   double truth = kInfinity;
@@ -102,26 +112,19 @@ TEST(HostileExtent, NoBoundIsAboveTheSpheres) {
     for (std::size_t i = 0; i < links.size(); ++i) {
       std::vector<bool> known(links.size(), false);
       known[i] = true;
-      std::vector<Cloud> clouds;
-      const int count = 1 + static_cast<int>(test::uniform(&rng, 0, 3.5));
-      for (int k = 0; k < count; ++k) {
-        const int size = 1 + static_cast<int>(std::pow(test::uniform(&rng, 0, 1), 3) * 100);
-        clouds.push_back(random_cloud(&rng, links[i], size));
-      }
+      const std::vector<Cloud> clouds = random_clouds(&rng, links[i]);
       std::vector<const CloudSnapshot*> all;
       for (const Cloud& cloud : clouds) all.push_back(&cloud.snapshot);
       ProximityQuery query(model, {});
       Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.5);
       for (int step = 0; step < 8; ++step) {
-        const QueryConfig config = random_config(&rng);
-        query.set_config(config);
+        QueryConfig config = random_config(&rng);
         const bool has_deadline = step % 4 == 3;
         if (has_deadline) {
-          QueryConfig limited = config;
-          limited.deadline = 1.0;
-          query.set_config(limited);
+          config.deadline = 1.0;
           Deadline::asks_left_for_test = static_cast<int>(test::uniform(&rng, 0, 12));
         }
+        query.set_config(config);
         const bool complete = query.run(Poses(links.size(), X_FL), known, all, &results);
         Deadline::asks_left_for_test = -1;
         ASSERT_TRUE(complete || has_deadline);

@@ -176,6 +176,17 @@ struct Robot {
     };
     return of(pair.first, pair.second) || of(pair.second, pair.first);
   }
+  bool are_closed(const LinkPair& pair) const {
+    return model->links[pair.first].solid.is_closed() &&
+           model->links[pair.second].solid.is_closed();
+  }
+  // Links with holes, and one that is inside out, need not have an inside where they touch.
+  bool has_inside(std::size_t link) const {
+    double volume = 0.0;
+    for (const auto& t : test::triangles_of(geometry[link]))
+      volume += t.p[0].dot(t.p[1].cross(t.p[2])) / 6.0;
+    return volume > 0.0 && model->links[link].solid.is_closed();
+  }
 };
 
 // Meshes and boxes of every kind, closed and open.
@@ -211,6 +222,27 @@ void expect_contact(const PairProximity& r, double truth, bool are_closed,
   }
 }
 
+struct Answers {
+  int near = 0, contacts = 0, through_holes = 0;
+
+  void expect(const Robot& robot, const LinkPair& pair, const std::vector<Eigen::Isometry3d>& X_FL,
+              const PairProximity& r, double tolerance) {
+    const double truth = robot.surfaces_apart(pair, X_FL);
+    const std::string what = std::to_string(pair.first) + ", " + std::to_string(pair.second) +
+                             " truth " + std::to_string(truth);
+    if (truth == 0.0 || robot.has_corner_inside(pair, X_FL)) {
+      expect_contact(r, truth, robot.are_closed(pair), what);
+      contacts += r.state == LinkState::kContact ? 1 : 0;
+      through_holes += truth > 0.0 ? 1 : 0;
+    } else if (r.state == LinkState::kContact) {  // a face inside, through a hole
+      EXPECT_FALSE(robot.are_closed(pair)) << what;
+    } else {
+      ++near;
+      expect_near(r, truth, tolerance, what);
+    }
+  }
+};
+
 TEST(LinkPairExact, RandomMeshesAgainstBruteForce) {
   test::Rng rng(21);
   const Robot robot(mesh_links(&rng));
@@ -218,11 +250,7 @@ TEST(LinkPairExact, RandomMeshesAgainstBruteForce) {
   for (std::size_t i = 0; i < robot.geometry.size(); ++i) {
     for (std::size_t k = i + 1; k < robot.geometry.size(); ++k) pairs.push_back({i, k});
   }
-  const auto are_closed = [&](const LinkPair& pair) {
-    const auto& links = robot.model->links;
-    return links[pair.first].solid.is_closed() && links[pair.second].solid.is_closed();
-  };
-  int near = 0, contacts = 0, through_holes = 0;
+  Answers answers;
   for (const double tolerance : {0.0, 0.001, 0.005}) {
     QueryConfig config;
     config.max_distance = 2.0;
@@ -231,33 +259,17 @@ TEST(LinkPairExact, RandomMeshesAgainstBruteForce) {
     std::vector<PairProximity> results;
     std::vector<Eigen::Isometry3d> X_FL(robot.geometry.size());
     for (int trial = 0; trial < test::scaled(12); ++trial) {
+      SCOPED_TRACE("trial " + std::to_string(trial));
       for (auto& X : X_FL) X = test::random_pose(&rng, 0.2);
       ASSERT_TRUE(query.run(X_FL, std::vector<bool>(X_FL.size(), true), &results));
       for (std::size_t i = 0; i < pairs.size(); ++i) {
-        const double truth = robot.surfaces_apart(pairs[i], X_FL);
-        const bool inside = robot.has_corner_inside(pairs[i], X_FL);
-        const PairProximity& r = results[i];
-        const std::string what = std::to_string(pairs[i].first) + ", " +
-                                 std::to_string(pairs[i].second) + " trial " +
-                                 std::to_string(trial) + " truth " + std::to_string(truth);
-        if (inside || truth == 0.0) {
-          expect_contact(r, truth, are_closed(pairs[i]), what);
-          contacts += r.state == LinkState::kContact ? 1 : 0;
-          through_holes += truth > 0.0 ? 1 : 0;
-          continue;
-        }
-        if (r.state == LinkState::kContact) {  // a face inside, through a hole
-          EXPECT_FALSE(are_closed(pairs[i])) << what;
-          continue;
-        }
-        ++near;
-        expect_near(r, truth, tolerance, what);
+        answers.expect(robot, pairs[i], X_FL, results[i], tolerance);
       }
     }
   }
-  EXPECT_GT(near, test::scaled(500));
-  EXPECT_GT(contacts, test::scaled(200));
-  EXPECT_GT(through_holes, test::kSanitized ? 0 : 5);
+  EXPECT_GT(answers.near, test::scaled(500));
+  EXPECT_GT(answers.contacts, test::scaled(200));
+  EXPECT_GT(answers.through_holes, test::kSanitized ? 0 : 5);
 }
 
 // What holds of a kept answer beside a fresh one. @param compares_touch  touching ones, too
@@ -274,51 +286,62 @@ void expect_same(const PairProximity& kept, const PairProximity& anew, double to
   }
 }
 
+// Links that move and turn steadily.
+struct Motion {
+  std::vector<Eigen::Isometry3d> X_FL;
+  std::vector<Point> velocity, turn;  // by a step
+
+  Motion(std::size_t links, test::Rng* rng) : X_FL(links) {
+    for (auto& X : X_FL) X = test::random_pose(rng, 0.2);
+    for (std::size_t i = 0; i < links; ++i) {
+      velocity.push_back(test::random_vector(rng, 1e-4));
+      turn.push_back(test::random_vector(rng, 5e-4));
+    }
+  }
+  void step() {
+    for (std::size_t i = 0; i < X_FL.size(); ++i) {
+      X_FL[i].translation() += velocity[i];
+      X_FL[i].linear() *= Eigen::AngleAxisd(turn[i].norm(), turn[i].normalized()).matrix();
+    }
+  }
+  // A jump, so that nothing is kept.
+  std::vector<Eigen::Isometry3d> far() const {
+    std::vector<Eigen::Isometry3d> X = X_FL;
+    for (std::size_t i = 0; i < X.size(); ++i) {
+      X[i].translation().x() += 5.0 * static_cast<double>(i);
+    }
+    return X;
+  }
+};
+
 // The answers along a motion are those of a fresh query.
 TEST(LinkPairExact, AMotionGivesTheAnswersOfFreshQueries) {
   test::Rng rng(22);
   const Robot robot(mesh_links(&rng));
   std::vector<LinkPair> pairs;
   for (std::size_t k = 1; k < robot.geometry.size(); ++k) pairs.push_back({k - 1, k});
-  // Links with holes, and one that is inside out, need not have an inside where they touch.
-  const auto has_inside = [&](std::size_t link) {
-    double volume = 0.0;
-    for (const auto& t : test::triangles_of(robot.geometry[link])) {
-      volume += t.p[0].dot(t.p[1].cross(t.p[2])) / 6.0;
-    }
-    return volume > 0.0 && robot.model->links[link].solid.is_closed();
-  };
+  std::vector<bool> have_insides;
+  for (const LinkPair& pair : pairs) {
+    have_insides.push_back(robot.has_inside(pair.first) && robot.has_inside(pair.second));
+  }
   QueryConfig config;
   config.max_distance = 0.5;
+  const std::vector<bool> known(robot.geometry.size(), true);
   for (const double tolerance : {0.0, 0.001}) {
     config.tolerance = tolerance;
     SelfQuery query(robot.model, pairs, config), fresh(robot.model, pairs, config);
     std::vector<PairProximity> kept, anew;
-    std::vector<Eigen::Isometry3d> X_FL(robot.geometry.size());
-    const std::vector<bool> known(X_FL.size(), true);
-    for (int motion = 0; motion < test::scaled(4); ++motion) {
-      for (auto& X : X_FL) X = test::random_pose(&rng, 0.2);
-      std::vector<Point> velocity, turn;
-      for (std::size_t i = 0; i < X_FL.size(); ++i) {
-        velocity.push_back(test::random_vector(&rng, 1e-4));
-        turn.push_back(test::random_vector(&rng, 5e-4));
-      }
+    for (int i = 0; i < test::scaled(4); ++i) {
+      Motion motion(robot.geometry.size(), &rng);
       for (int step = 0; step < 200; ++step) {
-        for (std::size_t i = 0; i < X_FL.size(); ++i) {
-          X_FL[i].translation() += velocity[i];
-          X_FL[i].linear() *= Eigen::AngleAxisd(turn[i].norm(), turn[i].normalized()).matrix();
-        }
-        query.run(X_FL, known, &kept);
+        motion.step();
+        query.run(motion.X_FL, known, &kept);
         if (step % 3 != 0) continue;
-        std::vector<Eigen::Isometry3d> far = X_FL;  // a jump, so that nothing is kept
-        for (std::size_t i = 0; i < far.size(); ++i)
-          far[i].translation().x() += 5.0 * static_cast<double>(i);
-        fresh.run(far, known, &anew);
-        fresh.run(X_FL, known, &anew);
-        for (std::size_t i = 0; i < pairs.size(); ++i) {
-          const bool has_insides = has_inside(pairs[i].first) && has_inside(pairs[i].second);
-          expect_same(kept[i], anew[i], tolerance, has_insides,
-                      "pair " + std::to_string(i) + " step " + std::to_string(step));
+        fresh.run(motion.far(), known, &anew);
+        fresh.run(motion.X_FL, known, &anew);
+        for (std::size_t k = 0; k < pairs.size(); ++k) {
+          expect_same(kept[k], anew[k], tolerance, have_insides[k],
+                      "pair " + std::to_string(k) + " step " + std::to_string(step));
           ASSERT_FALSE(HasFatalFailure());
         }
       }
