@@ -43,42 +43,43 @@ ConstraintRows empty_rows(Eigen::Index count, Eigen::Index joints) {
 // Which velocity is known to meet all bounds.
 enum class MetBy { kZero, kAnother, kUnknown };
 
-// Rows of all kinds: also parallel, opposite, equal, of zeros, and with limits of 0.
+// A row may be parallel, opposite or equal to the one before, of zeros, or have limits of 0.
+void fill_row(test::Rng* rng, Eigen::Index i, MetBy met_by, ConstraintRows* rows) {
+  for (Eigen::Index k = 0; k < rows->G.cols(); ++k) {
+    rows->G(i, k) = test::chance(rng, 0.2) ? 0.0 : test::uniform(rng, -1.0, 1.0);
+    rows->sweep(i, k) = test::chance(rng, 0.2) ? 0.0 : test::uniform(rng, 0.0, 1.5);
+  }
+  rows->h[i] = test::uniform(rng, met_by == MetBy::kZero ? 0.0 : -0.2, 0.8);
+  rows->sweep_limit[i] = test::chance(rng, 0.05) ? 0.0 : test::uniform(rng, 0.1, 4.0);
+  if (i > 0 && test::chance(rng, 0.2)) {
+    rows->G.row(i) = (test::chance(rng, 0.3) ? -1.0 : 1.0) * rows->G.row(i - 1);
+    if (test::chance(rng, 0.5)) rows->h[i] = rows->h[i - 1];
+    rows->sweep.row(i) = rows->sweep.row(i - 1);
+  }
+  if (test::chance(rng, 0.1)) rows->h[i] = 0.0;
+  if (test::chance(rng, 0.05)) rows->G.row(i).setZero();
+  if (rows->G.row(i).isZero(0.0)) rows->h[i] = std::abs(rows->h[i]);
+}
+
 Problem random_problem(test::Rng* rng, std::size_t joints, std::size_t count, MetBy met_by) {
   Problem problem;
-  problem.rows = empty_rows(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(joints));
+  ConstraintRows& rows = problem.rows;
+  rows = empty_rows(static_cast<Eigen::Index>(count), static_cast<Eigen::Index>(joints));
   for (std::size_t k = 0; k < joints; ++k) {
     problem.limits.speed.push_back(test::uniform(rng, 0.2, 2.0));
     problem.weights.push_back(test::power_of_ten(rng, -1.0, 1.0));
     problem.command.push_back(test::uniform(rng, -3.0, 3.0));
     problem.q.push_back(0.0);
   }
-  ConstraintRows& rows = problem.rows;
-  for (Eigen::Index i = 0; i < rows.G.rows(); ++i) {
-    for (Eigen::Index k = 0; k < rows.G.cols(); ++k) {
-      rows.G(i, k) = test::chance(rng, 0.2) ? 0.0 : test::uniform(rng, -1.0, 1.0);
-      rows.sweep(i, k) = test::chance(rng, 0.2) ? 0.0 : test::uniform(rng, 0.0, 1.5);
-    }
-    rows.h[i] = test::uniform(rng, met_by == MetBy::kZero ? 0.0 : -0.2, 0.8);
-    rows.sweep_limit[i] = test::chance(rng, 0.05) ? 0.0 : test::uniform(rng, 0.1, 4.0);
-    if (i > 0 && test::chance(rng, 0.2)) {
-      rows.G.row(i) = (test::chance(rng, 0.3) ? -1.0 : 1.0) * rows.G.row(i - 1);
-      if (test::chance(rng, 0.5)) rows.h[i] = rows.h[i - 1];
-      rows.sweep.row(i) = rows.sweep.row(i - 1);
-    }
-    if (test::chance(rng, 0.1)) rows.h[i] = 0.0;
-    if (test::chance(rng, 0.05)) rows.G.row(i).setZero();
-    if (rows.G.row(i).isZero(0.0)) rows.h[i] = std::abs(rows.h[i]);
+  for (Eigen::Index i = 0; i < rows.G.rows(); ++i) fill_row(rng, i, met_by, &rows);
+  if (met_by != MetBy::kAnother) return problem;
+  Eigen::VectorXd velocity(rows.G.cols());
+  for (std::size_t k = 0; k < joints; ++k) {
+    velocity[static_cast<Eigen::Index>(k)] =
+        problem.limits.speed[k] * test::uniform(rng, -1.0, 1.0);
   }
-  if (met_by == MetBy::kAnother) {
-    Eigen::VectorXd velocity(rows.G.cols());
-    for (std::size_t k = 0; k < joints; ++k) {
-      velocity[static_cast<Eigen::Index>(k)] =
-          problem.limits.speed[k] * test::uniform(rng, -1.0, 1.0);
-    }
-    rows.h = rows.h.cwiseMax(rows.G * velocity);
-    rows.sweep_limit = rows.sweep_limit.cwiseMax(rows.sweep * velocity.cwiseAbs());
-  }
+  rows.h = rows.h.cwiseMax(rows.G * velocity);
+  rows.sweep_limit = rows.sweep_limit.cwiseMax(rows.sweep * velocity.cwiseAbs());
   return problem;
 }
 

@@ -133,6 +133,34 @@ TEST(ControlLoop, NeverDrivesIntoObstacles) {
   EXPECT_GT(held, test::scaled(2000));
 }
 
+// How fast joints move the only place within a distance; 0 where there is none, or several.
+double speed_of_only(const ConstraintRows& rows, double distance) {
+  int near = 0;
+  double speed = 0.0;
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    if (rows.origins[i].bound > distance) continue;
+    ++near;
+    speed = rows.G.row(static_cast<Eigen::Index>(i)).norm();
+  }
+  return near == 1 ? speed : 0.0;
+}
+
+double least_bound(const ConstraintRows& rows) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < rows.count; ++i) least = std::min(least, rows.origins[i].bound);
+  return least;
+}
+
+// The way of all places within a distance away from what is there.
+Eigen::VectorXd way_out(const ConstraintRows& rows, double distance) {
+  Eigen::VectorXd away = Eigen::VectorXd::Zero(rows.G.cols());
+  for (std::size_t i = 0; i < rows.count; ++i) {
+    if (rows.origins[i].bound > distance) continue;
+    away -= rows.G.row(static_cast<Eigen::Index>(i)).transpose();
+  }
+  return away;
+}
+
 // A point within the stop distance of a link, or in it, is left on command: the retreat is free.
 TEST(ControlLoop, LeavesTheStopDistance) {
   ControlRobot robot = test::demo_control_robot();
@@ -144,9 +172,9 @@ TEST(ControlLoop, LeavesTheStopDistance) {
     Loop loop(&robot, RowConfig());
     const double inside = scene % 10 == 0 ? -0.005 : 0.002;
     CloudSnapshot cloud;
-    double reach = 0.0;
+    double speed = 0.0;
     // A place that joints can move, of one link alone.
-    while (reach < 0.1) {
+    while (speed < 0.1) {
       q = robot.random_position(&rng);
       robot.place(q);
       const Points points = {robot.point_near(&rng, test::uniform(&rng, inside, 0.04))};
@@ -154,32 +182,16 @@ TEST(ControlLoop, LeavesTheStopDistance) {
       if (robot.exact_distance(points) > 0.045) continue;
       loop.begin(q);
       loop.add(cloud, 0.0);
-      reach = 0.0;
-      int near = 0;
-      const ConstraintRows& rows = loop.rows();
-      for (std::size_t i = 0; i < rows.count; ++i) {
-        if (rows.origins[i].bound > 1.2 * loop.config.stop_distance) continue;
-        ++near;
-        reach = rows.G.row(static_cast<Eigen::Index>(i)).norm();
-      }
-      if (near != 1) reach = 0.0;
+      speed = speed_of_only(loop.rows(), 1.2 * loop.config.stop_distance);
     }
     for (int cycle = 0; cycle < 500; ++cycle) {
       loop.begin(q);
       loop.add(cloud, 0.0);
-      const ConstraintRows& rows = loop.rows();
-      Eigen::VectorXd away = Eigen::VectorXd::Zero(q.size());
-      double least = std::numeric_limits<double>::infinity();
-      for (std::size_t i = 0; i < rows.count; ++i) {
-        least = std::min(least, rows.origins[i].bound);
-        if (rows.origins[i].bound > loop.config.stop_distance) continue;
-        away -= rows.G.row(static_cast<Eigen::Index>(i)).transpose();
-      }
-      if (least > loop.config.stop_distance) {
+      if (least_bound(loop.rows()) > loop.config.stop_distance) {
         ++left;
         break;
       }
-      q += loop.config.horizon * loop.filtered(away, q);
+      q += loop.config.horizon * loop.filtered(way_out(loop.rows(), loop.config.stop_distance), q);
     }
   }
   EXPECT_EQ(left, scenes);

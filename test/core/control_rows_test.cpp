@@ -92,11 +92,30 @@ Eigen::VectorXd random_step(test::Rng* rng, Eigen::Index joints, double length) 
   return length / step.norm() * step;
 }
 
+constexpr double kStep = 1e-5;  // [rad] of a difference
+
+// Changes of distances over twice a step beside those that rows tell, where the nearest places stay
+// what they are.
+struct Gradients {
+  int compared = 0, changed = 0;
+
+  void compare(double change, const ConstraintRows& rows, Eigen::Index row,
+               const Eigen::VectorXd& step, bool is_same, double rounding) {
+    const double scale = 2.0 * rows.G.row(row).norm() * kStep;
+    if (!is_same || scale < 1e-2 * kStep) {
+      ++changed;
+      return;
+    }
+    ++compared;
+    ASSERT_NEAR(change, -2.0 * rows.G.row(row).dot(step), 1e-3 * scale + rounding);
+  }
+};
+
 TEST(ConstraintRows, GradientsAgreeWithCentralDifferences) {
   test::Rng rng(471);
-  constexpr double kStep = 1e-5;
   for (ControlRobot& robot : robots()) {
-    int compared = 0, changed = 0;
+    Gradients gradients;
+    SCOPED_TRACE(robot.name);
     for (int trial = 0; trial < test::scaled(3400); ++trial) {
       Scene scene(&robot, &rng, 3, 0.2);
       const ConstraintRows rows = scene.rows({});
@@ -115,18 +134,11 @@ TEST(ConstraintRows, GradientsAgreeWithCentralDifferences) {
                              after[link].state == before[link].state && moved < 20.0 * kStep &&
                              kink < 20.0 * kStep;
         const double change = after[link].distance - before[link].distance;
-        const double expected = -2.0 * rows.G.row(row).dot(step);
-        const double scale = 2.0 * rows.G.row(row).norm() * kStep;
-        if (!is_same || scale < 1e-2 * kStep) {
-          ++changed;
-          continue;
-        }
-        ++compared;
-        ASSERT_NEAR(change, expected, 1e-3 * scale)
-            << robot.name << " " << trial << ", " << robot.model->links[link].name;
+        gradients.compare(change, rows, row, step, is_same, 0.0);
+        ASSERT_FALSE(HasFatalFailure()) << trial << ", " << robot.model->links[link].name;
       }
     }
-    EXPECT_GT(compared, 3 * changed) << robot.name;
+    EXPECT_GT(gradients.compared, 3 * gradients.changed);
   }
 }
 
@@ -169,23 +181,35 @@ TEST(ConstraintRows, CertifiedRadiusHolds) {
   }
 }
 
+// Half of them with obstacles that come, and a skin in which some may be hidden.
+RowConfig random_config(test::Rng* rng) {
+  RowConfig config;
+  config.horizon = test::power_of_ten(rng, -3.0, 0.0);
+  config.approach_time = 1.0;
+  const bool hides = test::chance(rng, 0.5);
+  config.blind_skin = hides ? test::uniform(rng, 0.0, 0.03) : 0.0;
+  config.age = test::uniform(rng, 0.0, 0.2);
+  config.obstacle_speed = hides ? test::uniform(rng, 0.0, 0.1) : 0.0;
+  return config;
+}
+
+// As fast as a row's sweep allows; not finite where nothing is swept.
+Eigen::VectorXd fastest(const ConstraintRows& rows, Eigen::Index row, const Eigen::VectorXd& way) {
+  return rows.sweep_limit[row] / rows.sweep.row(row).dot(way.cwiseAbs()) * way;
+}
+
+// [m] What the theorem leaves of a bound.
+double left_of(double bound, double margin) { return bound > margin ? margin : 0.5 * bound; }
+
 // Any velocity that a row's sweep allows leaves what the theorem says to every point, after any
 // part of the horizon; and it is not far from what is possible.
 TEST(ConstraintRows, SweepLeavesTheMargin) {
   test::Rng rng(473);
-  RowConfig config;
   for (ControlRobot& robot : robots()) {
     double closest = 1.0;
     for (int trial = 0; trial < test::scaled(1500); ++trial) {
-      config.horizon = test::power_of_ten(&rng, -3.0, 0.0);
-      config.approach_time = 1.0;
-      // Half of them with obstacles that come, and a skin in which some may be hidden.
-      const bool hides = test::chance(&rng, 0.5);
-      config.blind_skin = hides ? test::uniform(&rng, 0.0, 0.03) : 0.0;
-      config.age = test::uniform(&rng, 0.0, 0.2);
-      config.obstacle_speed = hides ? test::uniform(&rng, 0.0, 0.1) : 0.0;
+      const RowConfig config = random_config(&rng);
       const double come = config.obstacle_speed * (config.age + config.horizon);
-      const double margin = config.margin + config.blind_skin;
       Scene scene(&robot, &rng, 8, 0.2);
       const ConstraintRows rows = scene.rows(config);
       for (std::size_t i = 0; i < rows.count; ++i) {
@@ -193,13 +217,12 @@ TEST(ConstraintRows, SweepLeavesTheMargin) {
         const auto link = static_cast<std::size_t>(rows.origins[i].index);
         const double bound = rows.origins[i].bound - come;
         if (!(bound > config.blind_skin)) continue;
-        const double left = bound > margin ? margin : 0.5 * bound;
-        Eigen::VectorXd velocity = random_step(&rng, scene.q.size(), 1.0);
+        const double left = left_of(bound, config.margin + config.blind_skin);
+        Eigen::VectorXd way = random_step(&rng, scene.q.size(), 1.0);
         // Half of them approach the witness.
-        if (trial % 2 == 0) velocity = rows.G.row(row).transpose();
-        const double swept = rows.sweep.row(row).dot(velocity.cwiseAbs());
-        if (!(swept > 0.0)) continue;
-        velocity *= rows.sweep_limit[row] / swept;
+        if (trial % 2 == 0) way = rows.G.row(row).transpose();
+        const Eigen::VectorXd velocity = fastest(rows, row, way);
+        if (!velocity.allFinite()) continue;
         for (const double part : {1.0, test::uniform(&rng, 0.0, 1.0)}) {
           robot.place(scene.q + part * config.horizon * velocity);
           const double distance = robot.exact_distance(link, scene.points) - come;
@@ -220,12 +243,13 @@ TEST(ConstraintRows, PairsAreBoundedLikeObstacles) {
         self_collision_pairs(*robot.model, *robot.kinematics, all, {});
     SelfQuery query(robot.model, pairs, exact());
     ConstraintRowBuilder builder(*robot.model, robot.kinematics, pairs);
+    Gradients gradients;
     std::vector<PairProximity> now, after, before;
     const auto measure = [&](const Eigen::VectorXd& q, std::vector<PairProximity>* answers) {
       robot.place(q);
       query.run(robot.poses().X_FL, robot.poses().known, answers);
     };
-    int compared = 0, changed = 0;
+    SCOPED_TRACE(robot.name);
     for (int trial = 0; trial < test::scaled(robot.name == "panda" ? 60 : 300); ++trial) {
       const Eigen::VectorXd q = robot.random_position(&rng);
       measure(q, &now);
@@ -234,7 +258,7 @@ TEST(ConstraintRows, PairsAreBoundedLikeObstacles) {
       builder.add_pairs(now);
       const ConstraintRows& rows = builder.rows();
       ASSERT_TRUE(rows.is_complete);
-      const Eigen::VectorXd step = random_step(&rng, q.size(), 1e-5);
+      const Eigen::VectorXd step = random_step(&rng, q.size(), kStep);
       measure(q + step, &after);
       measure(q - step, &before);
       for (std::size_t i = 0; i < rows.count; ++i) {
@@ -244,27 +268,21 @@ TEST(ConstraintRows, PairsAreBoundedLikeObstacles) {
         if (now[pair].state != LinkState::kNear || now[pair].distance < 0.01) continue;
         const bool is_same = (after[pair].p_FCa - before[pair].p_FCa).norm() < 4e-4 &&
                              (after[pair].direction - before[pair].direction).norm() < 4e-4;
-        const double scale = 2e-5 * rows.G.row(row).norm();
-        if (!is_same || scale < 1e-7) {
-          ++changed;
-          continue;
-        }
         const double change = after[pair].distance - before[pair].distance;
-        ++compared;
-        EXPECT_NEAR(change, -2.0 * rows.G.row(row).dot(step), 1e-3 * scale + 1e-10) << robot.name;
+        gradients.compare(change, rows, row, step, is_same, 1e-10);
+        ASSERT_FALSE(HasFatalFailure()) << trial;
       }
       const auto row = static_cast<Eigen::Index>(test::below(&rng, rows.count));
       const auto pair = static_cast<std::size_t>(rows.origins[static_cast<std::size_t>(row)].index);
       const double bound = now[pair].lower_bound;
       if (!(bound > config.margin)) continue;
-      Eigen::VectorXd velocity = random_step(&rng, q.size(), 1.0);
-      velocity *= rows.sweep_limit[row] / rows.sweep.row(row).dot(velocity.cwiseAbs());
+      const Eigen::VectorXd velocity = fastest(rows, row, random_step(&rng, q.size(), 1.0));
       if (!velocity.allFinite()) continue;
       measure(q + config.horizon * velocity, &after);
       if (after[pair].state == LinkState::kClear) continue;
-      ASSERT_GE(after[pair].distance, config.margin - 1e-9) << robot.name << " " << trial;
+      ASSERT_GE(after[pair].distance, config.margin - 1e-9) << trial;
     }
-    EXPECT_GT(compared, changed) << robot.name;
+    EXPECT_GT(gradients.compared, gradients.changed);
   }
 }
 
