@@ -320,9 +320,9 @@ TEST(LinkPairExact, AMotionGivesTheAnswersOfFreshQueries) {
   const Robot robot(mesh_links(&rng));
   std::vector<LinkPair> pairs;
   for (std::size_t k = 1; k < robot.geometry.size(); ++k) pairs.push_back({k - 1, k});
-  std::vector<bool> have_insides;
-  for (const LinkPair& pair : pairs) {
-    have_insides.push_back(robot.has_inside(pair.first) && robot.has_inside(pair.second));
+  std::vector<bool> have_insides(pairs.size());
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    have_insides[k] = robot.has_inside(pairs[k].first) && robot.has_inside(pairs[k].second);
   }
   QueryConfig config;
   config.max_distance = 0.5;
