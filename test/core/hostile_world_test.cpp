@@ -228,10 +228,7 @@ LinkProximity answer_at(const Eigen::Vector3d& p_F, const QueryConfig& config,
 TEST(HostileWorld, EveryObjectIsThereOrNamed) {
   const auto mesh = [](std::vector<Eigen::Vector3d> vertices,
                        std::vector<TriangleMesh::Triangle> triangles) {
-    TriangleMesh m;
-    m.vertices = std::move(vertices);
-    m.triangles = std::move(triangles);
-    return Shape(m);
+    return Shape(TriangleMesh{std::move(vertices), std::move(triangles)});
   };
   const TriangleMesh good = test::icosphere(0.1, 1);
   TriangleMesh flat = good, tiny = good, huge = good, mirrored = good, doubled = good, far = good;

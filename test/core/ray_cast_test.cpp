@@ -35,10 +35,7 @@ Eigen::Isometry3d random_pose(Random* random) {
 }
 
 GeometryElement element(const Shape& shape, const Eigen::Isometry3d& X_LE) {
-  GeometryElement e;
-  e.shape = shape;
-  e.X_LE = X_LE;
-  return e;
+  return {shape, X_LE, "test"};
 }
 
 // The first crossing by a loop over all triangles, by barycentric coordinates (Cramer's rule).
