@@ -267,7 +267,8 @@ class TrajectoryTest(unittest.TestCase):
         known = [m for m in self.heard if m.state in (m.CLEAR, m.CONTACT)]
         self.assertGreater(len(known), 20)
         for message in known:
-            stamp = message.header.stamp.to_sec()
+            # What is looked up before the answer is found may be 0.1 s old on a busy machine.
+            stamp = message.header.stamp.to_sec() - 0.1
             room = middle(stamp) - 0.05 - pt.BALL_RADIUS - FAR  # at the end
             if message.state == message.CLEAR:
                 self.assertLessEqual(message.lower_bound, room + 1e-3)
