@@ -210,7 +210,8 @@ struct LinkSearch : SearchResult {
   }
 };
 
-/// What a query holds of one link: for ever, from search to search, and of one search. One thread.
+/// The state of one link in a query: what never changes, what is kept from search to search, and
+/// the present search. One thread.
 struct LinkQueryState {
   explicit LinkQueryState(const LinkModel& link) : context(link), kept(link) {}
 

@@ -45,8 +45,8 @@ inline py::object without_mask(const py::object& given) {
   return given.attr("astype")("f8").attr("filled")(std::numeric_limits<double>::quiet_NaN());
 }
 
-/// What numpy takes for an array of numbers, NaN where it is masked or None. Raises TypeError for
-/// text, complex numbers, times and the like.
+/// Makes an array of numbers of what numpy takes for one: NaN where it is masked or None. Raises
+/// TypeError for text, complex numbers, times and the like.
 /// @param what  "q is an array of numbers"
 inline DoubleArray to_numbers(const py::object& given, const char* what) {
   const py::array array = py::array::ensure(without_mask(given));

@@ -44,7 +44,7 @@ struct ScanLimits {
 /// safe.
 std::string check_scan(const LaserScan& scan, const ScanLimits& limits = {});
 
-/// Where the sensor was when a beam was measured.
+/// A pose of the sensor during a scan, and the beam that was measured in it.
 struct SensorAtBeam {
   std::size_t beam = 0;  ///< from 0
   /// The sensor's frame at that beam -> at the first one, rigid.
@@ -71,8 +71,7 @@ struct ScanPoints {
 /// distances from the sensor's place at the first beam, which are not ranges.
 /// @param scan  checked by check_scan
 /// @param min_range, max_range  [m] of the points to keep, bounds included
-/// @param sensor  in the order of beams, from the first one to the last one; between two of them
-/// the
+/// @param sensor  poses by rising beams, from the first beam to the last one; between two poses the
 ///     sensor moves evenly. Empty, or all beams measured at once: it stands still
 /// @param sensor_range  [m] the most that the sensor can measure, beside its own range_max
 void to_points(const LaserScan& scan, double min_range, double max_range,

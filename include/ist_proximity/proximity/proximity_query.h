@@ -26,6 +26,7 @@ struct QueryConfig {
   /// that nothing is known of yet may exceed it by 50 us together.
   double deadline = 0.0;
   /// [m] >= 0, subtracted from every lower bound to allow for sensor noise, calibration, latency.
+  /// More than 1e9 counts as 1e9.
   double margin = 0.0;
   /// The tolerance as a ratio to the distance, used where that is wider than `tolerance`; 0 to 1.
   double relative_tolerance = 0.0;

@@ -25,7 +25,7 @@
 
 namespace ist {
 
-/// What a cycle or service asks a source for.
+/// A request for the snapshot of a source, by a cycle or a service.
 struct SnapshotRequest {
   std::shared_ptr<const RobotModel> model;  ///< that the snapshot has to be made with
   ros::Time time;        ///< a map is placed where it is then, or else at the newest known instant

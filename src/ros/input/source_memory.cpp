@@ -216,8 +216,8 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
   return "";
 }
 
-/// What was seen outside of a region was not remembered, and a larger one does not bring it back:
-/// it holds when all is forgotten that was remembered before.
+/// A memory drops what is seen outside of its region, and a larger region does not bring it back.
+/// So the larger one holds only from when nothing is left that would have been remembered in it.
 void SourceMemory::note_region(const RegionOfInterest& region, double stamp) {
   map_.set_region(region);
   const bool is_first = region_since_ == kNever;

@@ -8,9 +8,8 @@
 
 namespace ist {
 
-/// Where the transforms of a moving frame are so far apart in time that nobody knows its pose in
-/// between, which tf2 interpolates all the same: its publisher was silent, and the frame is
-/// elsewhere afterwards. Not thread safe.
+/// The gaps between transforms of a frame in which nobody knows its pose, which tf2 interpolates
+/// all the same: the publisher was silent, and the frame is elsewhere afterwards. Not thread safe.
 class TransformGaps {
  public:
   struct Gap {

@@ -119,10 +119,8 @@ std::string look_up_newest(const TransformBuffer& buffer, const std::string& fix
 std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
                          const std::string& frame, const ros::Time& time, double max_age,
                          Eigen::Isometry3d* X_FT, Lag* lag) {
-  if (lag) {
-    lag->age = 0.0;
-    lag->windows = 0;
-  }
+  lag->age = 0.0;
+  lag->windows = 0;
   if (is_known(buffer, fixed, frame, time, nullptr)) {
     return look_up(buffer, fixed, frame, time, X_FT);
   }
@@ -130,7 +128,7 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
   Eigen::Isometry3d X_newest;
   std::string problem = look_up_newest(buffer, fixed, frame, time, max_age, &X_newest, &stamp);
   if (!problem.empty()) return problem;
-  if (!lag || stamp.isZero()) {
+  if (stamp.isZero()) {
     *X_FT = X_newest;
     return "";
   }

@@ -49,7 +49,6 @@ struct Lag {
 /// `lag` are three, each as long as the age or 0.1 s, so that a frame that turns back is not taken
 /// for one that stands; there are fewer where the frame is new. Before there is one, the pose is
 /// not known. A lag that is used again keeps the memory of its name, so that nothing is allocated.
-/// @param lag  may be null: the newest pose will do
 std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
                          const std::string& frame, const ros::Time& time, double max_age,
                          Eigen::Isometry3d* X_FT, Lag* lag);
