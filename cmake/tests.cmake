@@ -162,6 +162,17 @@ if(catkin_FOUND AND TARGET ist_proximity_ros)
   endforeach()
 endif()
 
+# The node without any add-on.
+if(catkin_FOUND AND TARGET ist_proximity_ros)
+  ist_proximity_add_on_table(no_add_ons)
+  add_executable(test_bare_node EXCLUDE_FROM_ALL
+    src/nodes/proximity_node.cpp ${no_add_ons} $<TARGET_OBJECTS:ist_proximity_ros_objects>)
+  target_include_directories(test_bare_node PRIVATE src)
+  target_include_directories(test_bare_node SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  target_link_libraries(test_bare_node PRIVATE ist_proximity_core ${catkin_LIBRARIES})
+  add_dependencies(tests test_bare_node)
+endif()
+
 if(catkin_FOUND)
   find_package(rostest QUIET)
 endif()
@@ -169,7 +180,8 @@ if(rostest_FOUND)
   file(GLOB rostests CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} test/ros/*.test)
   foreach(file IN LISTS rostests)
     add_rostest(${file} DEPENDENCIES
-      proximity_node velocity_filter_node ist_proximity_nodelet simulator_node dodge_node)
+      proximity_node velocity_filter_node ist_proximity_nodelet simulator_node dodge_node
+      test_bare_node)
     string(REPLACE "/" "_" test ${file})
     # They wait for what the node says, and judge it by stamps and counts. Demos, in which robots move
     # in real time, and pairs of options, of which every message counts, run alone.

@@ -73,26 +73,7 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
     joint_states_ = std::make_unique<JointStateListener>(&buffer_, with_queue(nh_, &pose_thread_),
                                                          "joint_states", "", on_state);
   }
-  const auto live = [this] { return live_config(); };
-  if (config_.unknown_space != UnknownSpace::kFree) {
-    unknown_space_ = std::make_unique<UnknownSpaceWatch>(
-        memories_, config_.query.max_distance,
-        private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1));
-  }
-  trajectory_watch_ =
-      std::make_unique<TrajectoryWatch>(nh_, private_nh_, config_, loader_, sources_, buffer_,
-                                        unknown_space_.get(), ignore_service_, live);
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, loader_, sources_, buffer_,
-                                                  live, unknown_space_.get(), [this] {
-                                                    publish_diagnostics_when_due();
-                                                    trajectory_watch_->run_when_due();
-                                                  });
-  trajectory_watch_->subscribe(query_service_->queue());
-  if (config_.self_collision.enabled) {
-    self_proximity_ = std::make_unique<SelfProximity>(private_nh_, config_, loader_, buffer_,
-                                                      joint_states_.get(), live);
-    link_pairs_ = std::make_unique<LinkPairService>(private_nh_, config_, loader_);
-  }
+  make_services();
   cycle_thread_ = std::thread(&Impl::run_cycles, this);
   pose_thread_.start("ist tf", [this] { buffer_.end_disputes(ros::Time::now()); });
 }
@@ -106,11 +87,32 @@ ProximityServer::Impl::~Impl() {
   pose_thread_.stop();
   warm_up_.end();
   query_service_->stop();
-  trajectory_watch_.reset();
+  add_ons_.clear();
   query_service_.reset();
-  self_proximity_.reset();
-  link_pairs_.reset();
   cycle_.reset();
+}
+
+/// Makes the add-ons and ~query, which share a thread.
+void ProximityServer::Impl::make_services() {
+  const AddOnContext context{nh_,
+                             private_nh_,
+                             config_,
+                             loader_,
+                             sources_,
+                             memories_,
+                             buffer_,
+                             joint_states_.get(),
+                             add_ons_,
+                             [this] { return live_config(); },
+                             [this](const ros::Time& now) { return ignore_service_.names(now); }};
+  make_add_ons(context, &add_ons_);
+  query_service_ = std::make_unique<QueryService>(context, [this] {
+    publish_diagnostics_when_due();
+    for (const std::unique_ptr<AddOn>& add_on : add_ons_) add_on->run_when_due();
+  });
+  for (const std::unique_ptr<AddOn>& add_on : add_ons_) {
+    add_on->subscribe(query_service_->queue());
+  }
 }
 
 /// Adds a source, and what it remembers.
@@ -186,7 +188,7 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
 /// @param is_of_cycle  whether the cycle has made it
 void ProximityServer::Impl::publish(const ist_proximity::ProximityArrayConstPtr& message,
                                     bool is_of_cycle, const SpeedScaleConfig& speed_scale) {
-  const auto self = is_of_cycle && self_proximity_ ? self_proximity_->newest(*model_) : nullptr;
+  const auto self = is_of_cycle ? newest_self_proximity() : nullptr;
   const bool has_cycle = is_of_cycle && cycle_;
   summary_.publish(*message, self.get(), speed_scale, ros::Time::now(),
                    has_cycle ? cycle_->full_speed_reach() : Span<const StoppingReach>());
@@ -208,6 +210,14 @@ void ProximityServer::Impl::publish(const ist_proximity::ProximityArrayConstPtr&
   const MarkerScene scene = has_cycle ? cycle_->marker_scene() : MarkerScene();
   publish_message(markers_, marker_drawer_.draw(*message, scene));
   ++report_.markers_drawn;
+}
+
+ist_proximity::ProximityArrayConstPtr ProximityServer::Impl::newest_self_proximity() const {
+  for (const std::unique_ptr<AddOn>& add_on : add_ons_) {
+    auto newest = add_on->self_proximity(*model_);
+    if (newest) return newest;
+  }
+  return nullptr;
 }
 
 void ProximityServer::Impl::run_cycle() {

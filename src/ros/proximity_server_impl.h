@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "ist_proximity/ros/proximity_server.h"
+#include "ros/add_ons/add_on.h"
 #include "ros/common/callback_thread.h"
 #include "ros/common/stop_signal.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/cycle/scene_warm_up.h"
 #include "ros/input/source_memory.h"
-#include "ros/input/unknown_space.h"
 #include "ros/input/zone_store.h"
 #include "ros/model/contact_loader.h"
 #include "ros/model/counted_links.h"
@@ -34,14 +34,11 @@
 #include "ros/poses/transform_buffer.h"
 #include "ros/poses/usual_period.h"
 #include "ros/services/ignore_service.h"
-#include "ros/services/link_pair_service.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
-#include "ros/services/self_proximity.h"
 #include "ros/services/zone_services.h"
 #include "ros/status/cycle_report.h"
 #include "ros/status/diagnostics_publisher.h"
-#include "ros/trajectory/trajectory_watch.h"
 
 namespace ist {
 
@@ -77,6 +74,8 @@ class ProximityServer::Impl {
   void notice_ignored_links(const ros::Time& now);
   void refine_model(std::shared_ptr<const ModelState> model);
   void set_source_targets(const QueryConfig& query);
+  void make_services();
+  ist_proximity::ProximityArrayConstPtr newest_self_proximity() const;
   double largest_extent() const;
   void publish_diagnostics_when_due();
   void publish_diagnostics();
@@ -96,9 +95,8 @@ class ProximityServer::Impl {
   SourceMemories memories_;
   SceneWarmUp warm_up_{sources_};  ///< used by the threads of the sources
   CloudSources sources_;
-  std::vector<std::shared_ptr<Source>> inputs_;       ///< those of them that are no memories
-  std::unique_ptr<UnknownSpaceWatch> unknown_space_;  ///< null with ~unknown_space free
-  CallbackThread model_thread_;                       ///< loads, packs volumes, attaches
+  std::vector<std::shared_ptr<Source>> inputs_;  ///< those of them that are no memories
+  CallbackThread model_thread_;                  ///< loads, packs volumes, attaches
   ModelLoader loader_;
   LiveParameters live_;
   ContactLoader contact_loader_;
@@ -132,10 +130,8 @@ class ProximityServer::Impl {
   ros::Time last_stamp_;  ///< of the last ~proximity
   Clock::time_point next_markers_;
 
-  std::unique_ptr<TrajectoryWatch> trajectory_watch_;
+  AddOns add_ons_;
   std::unique_ptr<QueryService> query_service_;
-  std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
-  std::unique_ptr<LinkPairService> link_pairs_;    ///< the same
   std::thread cycle_thread_;
 };
 

@@ -39,7 +39,8 @@ void ProximityServer::Impl::take_model() {
         model_, config_,
         make_pose_source(*model_, config_, buffer_, joint_states_.get(),
                          JointStateListener::Which::kTaken),
-        CloudSelection::Reader::kOnly, unknown_space_.get());
+        CloudSelection::Reader::kOnly,
+        make_cycles(add_ons_, *model_, CloudSelection::Reader::kOnly));
     cycle_->continue_from(last_stamp_);
   } else {
     cycle_.reset();

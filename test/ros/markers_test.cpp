@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "ros/input/unknown_space.h"
+#include "ros/unknown_space/unknown_space.h"
 #include "support/scene.h"
 
 namespace ist {

@@ -5,6 +5,7 @@ import os
 import sys
 import unittest
 
+import numpy as np
 import proximity_testing as pt
 import rospy
 import rosparam
@@ -202,6 +203,12 @@ WRONG = [
 ]
 
 
+class BareNode(pt.ProximityNode):
+    """The node without any add-on."""
+
+    command = [pt.find_program("ist_proximity", "test_bare_node")]
+
+
 class ParametersTest(unittest.TestCase):
     def test_wrong(self):
         for i, (parameters, words) in enumerate(WRONG):
@@ -213,6 +220,39 @@ class ParametersTest(unittest.TestCase):
                 self.assertGreater(code, 0, log)
                 for word in words:
                     self.assertIn(word, log)
+
+    def test_without_add_ons(self):
+        """A node without add-ons measures, and says what to build where one of them is asked for."""
+        world = pt.World("/bare").stand()
+        self.addCleanup(world.stop)
+        world.points = np.array([[0.0, 0.0, 1.0]])
+        world.start_tf()
+        node = BareNode(world.namespace, {}, pt.urdf())
+        world.start_clouds()
+        node.wait_for_status(pt.ProximityArray.OK)
+        self.assertEqual(node.stop(), 0)
+        node = BareNode(
+            "/asked",
+            {
+                "self_collision/enabled": True,
+                "unknown_space": "report",
+                "memory/enabled": True,
+                "trajectory/cancel_topic": "goal/cancel",
+                "joint_deceleration": 1.0,
+            },
+            pt.urdf(),
+            listen=False,
+        )
+        self.assertGreater(node.process.wait(pt.TIMEOUT), 0)
+        log = node.log()
+        node.stop()
+        for parameter, add_on in (
+            ("self_collision/enabled", "link_pairs"),
+            ("unknown_space", "unknown_space"),
+            ("trajectory/cancel_topic", "trajectory"),
+        ):
+            self.assertIn("~%s needs the add-on %s, which this node" % (parameter, add_on), log)
+            self.assertIn('IST_PROXIMITY_ADD_ONS="%s"' % add_on, log)
 
     def test_unknown(self):
         """A misspelt name is reported with the nearest one, and the node runs."""

@@ -18,8 +18,6 @@ using ist_proximity::ProximityArray;
 
 namespace {
 
-// Of a cycle's deadline: unknown space needs coarse bounds only.
-constexpr double kUnknownShare = 0.2;
 constexpr double kLeastDeadline = 1e-9;  // [s] 0 would be none
 
 constexpr char kOutsideRegion[] =
@@ -31,7 +29,7 @@ constexpr char kOutsideRegion[] =
 
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
                                std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader,
-                               UnknownSpaceWatch* watch)
+                               std::vector<std::unique_ptr<AddOnCycle>> add_ons)
     : model_(std::move(model)),
       packed_(model_->robot),
       robot_(*model_->robot),
@@ -43,11 +41,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       future_(config.deceleration, model_->kinematics, boxes_, model_->monitored),
       selection_(reader),
       queries_(std::make_unique<CoherentQueries>(model_->robot, config.query)),
-      unknown_space_(watch == nullptr
-                         ? nullptr
-                         : std::make_unique<UnknownSpaceQuery>(
-                               model_->robot, watch, reader == CloudSelection::Reader::kOnly)),
-      unknown_is_obstacle_(config.unknown_space == UnknownSpace::kObstacle),
+      add_ons_(std::move(add_ons)),
       filters_(robot_.links.size()),
       speeds_(robot_.links.size()),
       joint_repulsion_(*model_),
@@ -81,7 +75,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
 
   run_query(config, begin);
   note_asked(config);
-  ask_unknown_space(config);
+  run_add_ons(config);
   message->query_time = watch.lap();
   find_urgent_links();
   compute_pushes(config, end_of(deadline_, kRepulsionShare, begin));
@@ -225,14 +219,11 @@ void ProximityCycle::place_carried_objects() {
   selection_.set_worlds(carried_.worlds());
 }
 
-void ProximityCycle::ask_unknown_space(const LiveConfig& config) {
-  if (!unknown_space_) return;
-  QueryConfig query = config.query;
-  query.deadline *= kUnknownShare;
-  note(
-      Rank::kDegraded, "query",
-      unknown_space_->run(poses_, known_, fixed_frame_, query, config.repulsion.influence_distance),
-      &status_input_.findings);
+void ProximityCycle::run_add_ons(const LiveConfig& config) {
+  for (const std::unique_ptr<AddOnCycle>& add_on : add_ons_) {
+    note(Rank::kDegraded, "query", add_on->run(poses_, known_, fixed_frame_, config),
+         &status_input_.findings);
+  }
 }
 
 /// The links that matter most are served first, as time may end.
@@ -318,10 +309,8 @@ void ProximityCycle::fill_links(ProximityArray* message) {
                 source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
                 &message->links[k]);
     assign_box(boxes_[i].box_L, &message->links[k]);
-    if (unknown_space_ && result.state != LinkState::kUnknown) {
-      assign_unknown_space(unknown_space_->answer(i).seen, unknown_space_->answer(i).lower_bound,
-                           unknown_space_->answer(i).direction, unknown_is_obstacle_,
-                           &message->links[k]);
+    for (std::size_t n = 0; n < add_ons_.size() && result.state != LinkState::kUnknown; ++n) {
+      add_ons_[n]->fill(i, &message->links[k]);
     }
     message->links[k].robot_future = future_.left_of(k, message->links[k].lower_bound);
   }
@@ -365,7 +354,7 @@ void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
   }
   packed_ = model->robot;
   queries_->set_model(packed_, model->repulsion ? *model->repulsion : Repulsion(packed_));
-  if (unknown_space_) unknown_space_->set_model(packed_);
+  for (const std::unique_ptr<AddOnCycle>& add_on : add_ons_) add_on->set_model(packed_);
 }
 
 void ProximityCycle::forget() {
@@ -385,10 +374,11 @@ MarkerScene ProximityCycle::marker_scene() const {
       scene.robot.extend(p_FS + Eigen::Vector3d::Constant(sphere.radius));
     }
   }
-  for (std::size_t k = 0; unknown_space_ && k < model_->monitored.size(); ++k) {
-    const UnknownSpaceAnswer& answer = unknown_space_->answer(model_->monitored[k]);
-    if (!known_[model_->monitored[k]] || !answer.p_FCl.allFinite()) continue;
-    scene.unseen.push_back({k, answer.p_FCl, answer.p_FCo});
+  for (std::size_t k = 0; k < model_->monitored.size(); ++k) {
+    const std::size_t link = model_->monitored[k];
+    for (std::size_t n = 0; n < add_ons_.size() && known_[link]; ++n) {
+      add_ons_[n]->draw(link, k, &scene);
+    }
   }
   return scene;
 }

@@ -16,12 +16,12 @@
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ros/cycle/add_on_cycle.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/cycle/late_frames.h"
 #include "ros/cycle/late_joints.h"
 #include "ros/cycle/robot_future.h"
 #include "ros/cycle/scene_warm_up.h"
-#include "ros/cycle/unknown_space_query.h"
 #include "ros/cycle/world_answers.h"
 #include "ros/input/source.h"
 #include "ros/model/model_state.h"
@@ -43,10 +43,10 @@ class ProximityCycle {
  public:
   /// @param model  with a robot, of which links may be pending
   /// @param poses  of model->robot->links; null where the kinematics that it needs is faulty
-  /// @param watch  outlives this; null with ~unknown_space free
+  /// @param add_ons  their parts in the cycle, see make_cycles()
   ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
                  std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader,
-                 UnknownSpaceWatch* watch = nullptr);
+                 std::vector<std::unique_ptr<AddOnCycle>> add_ons);
 
   /// @param now      the ROS clock's time
   /// @param message  overwritten; its memory is kept, so that a message that was used by a cycle
@@ -125,7 +125,7 @@ class ProximityCycle {
   void run_query(const LiveConfig& config, TimePoint begin);
   void note_late_frames();
   void place_carried_objects();
-  void ask_unknown_space(const LiveConfig& config);
+  void run_add_ons(const LiveConfig& config);
   void find_urgent_links();
   void compute_pushes(const LiveConfig& config, TimePoint end);
   void compute_wrenches(const LiveConfig& config, TimePoint end);
@@ -151,8 +151,7 @@ class ProximityCycle {
   std::uint64_t last_obstacles_ = 0;  ///< key of the clouds of the last cycle
   std::uint64_t partial_ = 0;         ///< counts answers of objects that were not all measured
   AskedScene asked_;
-  std::unique_ptr<UnknownSpaceQuery> unknown_space_;  ///< null: unknown space is free
-  const bool unknown_is_obstacle_;
+  const std::vector<std::unique_ptr<AddOnCycle>> add_ons_;
   std::vector<RepulsionFilter> filters_;  ///< by link of the robot
   std::vector<ClosingSpeed> speeds_;      ///< by link of the robot
   JointRepulsion joint_repulsion_;

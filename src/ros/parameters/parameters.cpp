@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "internal/packing/packing_cache.h"
+#include "ros/common/built_add_ons.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/text.h"
 #include "ros/parameters/parameter_reader.h"
@@ -92,6 +93,21 @@ void check_unknown_space(ParameterReader* reader, const ServerConfig& config) {
   if (first == nullptr) refuse("a memory says what has been seen; set ~memory/enabled");
 }
 
+/// What is configured needs the add-on that does it.
+void check_add_ons(ParameterReader* reader, const ServerConfig& config) {
+  const auto check = [&](const char* add_on, const char* parameter, bool is_wanted) {
+    const std::vector<std::string>& built = built_add_ons();
+    if (!is_wanted || std::find(built.begin(), built.end(), add_on) != built.end()) return;
+    reader->add_error(parameter, std::string("needs the add-on ") + add_on +
+                                     ", which this node is built without: build it with CMake's "
+                                     "IST_PROXIMITY_ADD_ONS=\"" +
+                                     join(built, ";") + (built.empty() ? "" : ";") + add_on + '"');
+  };
+  check("link_pairs", "self_collision/enabled", config.self_collision.enabled);
+  check("trajectory", "trajectory/cancel_topic", !config.trajectory.cancel_topic.empty());
+  check("unknown_space", "unknown_space", config.unknown_space != UnknownSpace::kFree);
+}
+
 }  // namespace
 
 std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& private_nh) {
@@ -146,6 +162,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
     source.ingest.search_distance = config.query.max_distance;
   }
   check_unknown_space(&reader, config);
+  check_add_ons(&reader, config);
   if (!config.trajectory.cancel_topic.empty() && !config.deceleration.is_stated()) {
     reader.add_error("trajectory/cancel_topic",
                      "needs ~joint_deceleration: nobody knows when braking is due without it");

@@ -38,15 +38,9 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 
 }  // namespace
 
-QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
-                           const ModelLoader& loader, const CloudSources& sources,
-                           const TransformBuffer& buffer, std::function<LiveConfig()> live,
-                           UnknownSpaceWatch* watch, std::function<void()> meanwhile)
-    : config_(config),
-      live_(std::move(live)),
-      meanwhile_(std::move(meanwhile)),
-      stated_(config, loader, sources, buffer, watch),
-      self_(config) {
+QueryService::QueryService(const AddOnContext& node, std::function<void()> meanwhile)
+    : live_(node.live), meanwhile_(std::move(meanwhile)), stated_(node), self_(node.config) {
+  ros::NodeHandle private_nh = node.private_nh;
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
   thread_.start("ist query", [this] {

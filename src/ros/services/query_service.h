@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "ros/common/callback_thread.h"
-#include "ros/parameters/parameters.h"
 #include "ros/services/self_query_answer.h"
 #include "ros/services/stated_cycle.h"
 
@@ -20,15 +19,9 @@ namespace ist {
 /// memory.
 class QueryService {
  public:
-  /// @param loader, sources, buffer  outlive this
-  /// @param watch            outlives this; null with ~unknown_space free
-  /// @param live             gives the present configuration; called from the service's thread
-  /// @param meanwhile        what else that thread does: called 20 times a second or more often,
-  ///                         also during a long request; throws nothing
-  QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const ModelLoader& loader,
-               const CloudSources& sources, const TransformBuffer& buffer,
-               std::function<LiveConfig()> live, UnknownSpaceWatch* watch,
-               std::function<void()> meanwhile);
+  /// @param meanwhile  what else that thread does: called 20 times a second or more often, also
+  ///                   during a long request; throws nothing
+  QueryService(const AddOnContext& node, std::function<void()> meanwhile);
   ~QueryService();
 
   /// Ends the service's thread.
@@ -49,7 +42,6 @@ class QueryService {
   std::string check_size(const Service::Request& request) const;
   void return_memory();
 
-  const ServerConfig config_;
   const std::function<LiveConfig()> live_;
   const std::function<void()> meanwhile_;
   CallbackThread thread_;

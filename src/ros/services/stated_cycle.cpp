@@ -22,8 +22,9 @@ std::string StatedCycle::take_model() {
                                                   fixed_frame_of(*model_, config_),
                                                   link_names(*model_->robot), config_.pose_timeout);
   poses_ = poses.get();
-  cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
-                                            CloudSelection::Reader::kOther, watch_);
+  cycle_ = std::make_unique<ProximityCycle>(
+      model_, config_, std::move(poses), CloudSelection::Reader::kOther,
+      make_cycles(add_ons_, *model_, CloudSelection::Reader::kOther));
   reach_ = kinematic_reach(*model_->robot, *model_->kinematics);
   impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
   return "";

@@ -8,10 +8,8 @@
 #include <vector>
 
 #include "ist_proximity/proximity/time_of_impact.h"
+#include "ros/add_ons/add_on.h"
 #include "ros/cycle/proximity_cycle.h"
-#include "ros/input/unknown_space.h"
-#include "ros/model/model_loader.h"
-#include "ros/parameters/parameters.h"
 #include "ros/poses/stated_pose_source.h"
 
 namespace ist {
@@ -21,11 +19,12 @@ namespace ist {
 /// thread.
 class StatedCycle {
  public:
-  /// @param loader, sources, buffer  outlive this
-  /// @param watch                    outlives this; null with ~unknown_space free
-  StatedCycle(const ServerConfig& config, const ModelLoader& loader, const CloudSources& sources,
-              const TransformBuffer& buffer, UnknownSpaceWatch* watch)
-      : config_(config), loader_(loader), sources_(sources), buffer_(buffer), watch_(watch) {}
+  explicit StatedCycle(const AddOnContext& node)
+      : config_(node.config),
+        loader_(node.loader),
+        sources_(node.sources),
+        buffer_(node.buffer),
+        add_ons_(node.add_ons) {}
 
   /// Takes the newest model.
   /// @returns empty, or why there is none
@@ -53,7 +52,7 @@ class StatedCycle {
   const ModelLoader& loader_;
   const CloudSources& sources_;
   const TransformBuffer& buffer_;
-  UnknownSpaceWatch* const watch_;  ///< null with ~unknown_space free
+  const AddOns& add_ons_;
 
   std::shared_ptr<const ModelState> model_;
   StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle

@@ -29,21 +29,17 @@ ServerConfig with_fixed_links(ServerConfig config) {
 
 }  // namespace
 
-TrajectoryWatch::TrajectoryWatch(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
-                                 const ServerConfig& config, const ModelLoader& loader,
-                                 const CloudSources& sources, const TransformBuffer& buffer,
-                                 UnknownSpaceWatch* watch, const IgnoreService& ignored,
-                                 std::function<LiveConfig()> live)
-    : nh_(nh),
-      private_nh_(private_nh),
-      config_(with_fixed_links(config)),
-      ignored_(ignored),
-      live_(std::move(live)),
-      stated_(config, loader, sources, buffer, watch) {
+TrajectoryWatch::TrajectoryWatch(const AddOnContext& node)
+    : nh_(node.nh),
+      private_nh_(node.private_nh),
+      config_(with_fixed_links(node.config)),
+      ignored_links_(node.ignored_links),
+      live_(node.live),
+      stated_(node) {
   publisher_ = private_nh_.advertise<Message>("trajectory_clearance", 10);
   markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("trajectory_markers", 1);
-  if (!config.trajectory.cancel_topic.empty()) {
-    cancel_ = nh_.advertise<actionlib_msgs::GoalID>(config.trajectory.cancel_topic, 10);
+  if (!config_.trajectory.cancel_topic.empty()) {
+    cancel_ = nh_.advertise<actionlib_msgs::GoalID>(config_.trajectory.cancel_topic, 10);
   }
 }
 
@@ -220,7 +216,7 @@ std::vector<bool> TrajectoryWatch::moved_links(const ros::Time& now) const {
                   [&](const CarriedWorlds::Frame& frame) { return is_moved(frame.body); });
   std::vector<bool> links(robot.links.size(), false);
   const std::vector<bool> counts =
-      counted_links(*model_, config_, ignored_.names(now), true).counts;
+      counted_links(*model_, config_, ignored_links_(now), true).counts;
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const std::size_t link = model_->monitored[i];
     const auto body = kinematics.find_body(robot.links[link].name);

@@ -14,8 +14,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "ros/parameters/parameters.h"
-#include "ros/services/ignore_service.h"
+#include "ros/add_ons/add_on.h"
 #include "ros/services/stated_cycle.h"
 #include "ros/trajectory/watched_trajectory.h"
 
@@ -31,22 +30,12 @@ namespace ist {
 /// no known object, nor those that ~ignore_links leaves out of ~min_distance. While somebody
 /// listens to ~trajectory_markers, the robot is drawn where it touches. It is called by the thread
 /// of one callback queue.
-class TrajectoryWatch {
+class TrajectoryWatch : public AddOn {
  public:
-  /// @param loader, sources, buffer, ignored  outlive this
-  /// @param watch            outlives this; null with ~unknown_space free
-  /// @param live             gives the present configuration
-  TrajectoryWatch(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
-                  const ServerConfig& config, const ModelLoader& loader,
-                  const CloudSources& sources, const TransformBuffer& buffer,
-                  UnknownSpaceWatch* watch, const IgnoreService& ignored,
-                  std::function<LiveConfig()> live);
+  explicit TrajectoryWatch(const AddOnContext& node);
 
-  /// Begins to receive messages by a queue, which outlives this; its thread ends first.
-  void subscribe(ros::CallbackQueue* queue);
-
-  /// Goes on where something is due; to be called every 10 ms or more often.
-  void run_when_due();
+  void subscribe(ros::CallbackQueue* queue) override;
+  void run_when_due() override;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -76,7 +65,7 @@ class TrajectoryWatch {
 
   ros::NodeHandle nh_, private_nh_;
   const ServerConfig config_;
-  const IgnoreService& ignored_;
+  const std::function<std::vector<std::string>(const ros::Time&)> ignored_links_;
   const std::function<LiveConfig()> live_;
   StatedCycle stated_;
   ros::Publisher publisher_, markers_, cancel_;

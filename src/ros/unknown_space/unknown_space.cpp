@@ -1,4 +1,4 @@
-#include "ros/input/unknown_space.h"
+#include "ros/unknown_space/unknown_space.h"
 
 #include <ros/console.h>
 

@@ -1,4 +1,4 @@
-#include "ros/services/self_proximity.h"
+#include "ros/link_pairs/self_proximity.h"
 
 #include <ros/console.h>
 

@@ -9,9 +9,8 @@
 
 #include "internal/proximity/surroundings.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "ros/input/unknown_space.h"
-#include "ros/parameters/parameters.h"
-#include "ros/poses/pose_source.h"
+#include "ros/cycle/add_on_cycle.h"
+#include "ros/unknown_space/unknown_space.h"
 
 namespace ist {
 
@@ -25,26 +24,23 @@ struct UnknownSpaceAnswer {
 };
 
 /// Measures links against unknown space, beside the query of what has been seen. One thread.
-class UnknownSpaceQuery {
+class UnknownSpaceQuery : public AddOnCycle {
  public:
-  /// @param watch   outlives this
-  /// @param reader  whether this is the one thread that calls watch.newest()
-  UnknownSpaceQuery(std::shared_ptr<const RobotModel> model, UnknownSpaceWatch* watch,
-                    bool is_only_reader);
+  /// @param is_only_reader  whether this is the one thread that calls watch.newest()
+  /// @param is_obstacle     whether unknown space counts in `lower_bound`
+  UnknownSpaceQuery(std::shared_ptr<const RobotModel> model,
+                    std::shared_ptr<UnknownSpaceWatch> watch, bool is_only_reader,
+                    bool is_obstacle);
 
-  /// @param poses          of the links, in `fixed_frame`; ages count from their stamp
-  /// @param known          as ProximityQuery::run()
-  /// @param config         its deadline [s] is for this query
+  void set_model(std::shared_ptr<const RobotModel> model) override;
+
+  /// @param poses  ages count from their stamp
   /// @returns empty, or a sentence on why all space counts as unknown, though some has been seen
   std::string run(const StampedLinkPoses& poses, const std::vector<bool>& known,
-                  const std::string& fixed_frame, const QueryConfig& config,
-                  double influence_distance);
+                  const std::string& fixed_frame, const LiveConfig& config) override;
 
-  /// The answer for a link of the last run(). While nothing has been seen, it may be inside
-  /// something everywhere.
-  const UnknownSpaceAnswer& answer(std::size_t link) const { return answers_[link]; }
-
-  void set_model(std::shared_ptr<const RobotModel> model);
+  void fill(std::size_t link, ist_proximity::LinkProximity* message) const override;
+  void draw(std::size_t link, std::size_t place, MarkerScene* scene) const override;
 
  private:
   double deepest(std::size_t link) const;
@@ -53,12 +49,13 @@ class UnknownSpaceQuery {
                   double influence_distance, const UnknownSnapshot& unknown);
 
   std::shared_ptr<const RobotModel> model_;
-  UnknownSpaceWatch& watch_;
-  const bool is_only_reader_;
+  const std::shared_ptr<UnknownSpaceWatch> watch_;
+  const bool is_only_reader_, is_obstacle_;
   ProximityQuery query_;
   std::shared_ptr<const UnknownSnapshot> held_;  ///< by other readers
   CloudSnapshot placed_;                         ///< the boxes of a snapshot
   std::vector<LinkProximity> results_;
+  /// By link. While nothing has been seen, it may be inside something everywhere.
   std::vector<UnknownSpaceAnswer> answers_;
   std::vector<std::optional<Surroundings>> surroundings_;  ///< by link, made when first needed
   double surroundings_distance_ = 0.0;                     ///< [m] that they are made with

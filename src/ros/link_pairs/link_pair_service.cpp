@@ -1,4 +1,4 @@
-#include "ros/services/link_pair_service.h"
+#include "ros/link_pairs/link_pair_service.h"
 
 #include <ros/console.h>
 

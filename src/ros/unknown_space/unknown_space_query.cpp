@@ -1,7 +1,9 @@
-#include "ros/cycle/unknown_space_query.h"
+#include "ros/unknown_space/unknown_space_query.h"
 
 #include <algorithm>
 #include <utility>
+
+#include "ros/output/message_conversion.h"
 
 namespace ist {
 namespace {
@@ -9,8 +11,11 @@ namespace {
 // Unknown space is known to a voxel, so that closer bounds would say no more.
 constexpr double kTolerance = 0.01;         // [m]
 constexpr double kRelativeTolerance = 0.1;  // of the distance
+// Of a cycle's deadline: unknown space needs coarse bounds only.
+constexpr double kUnknownShare = 0.2;
 
 QueryConfig coarse(QueryConfig config) {
+  config.deadline *= kUnknownShare;
   config.tolerance = std::max(config.tolerance, kTolerance);
   config.relative_tolerance = std::max(config.relative_tolerance, kRelativeTolerance);
   return config;
@@ -19,10 +24,12 @@ QueryConfig coarse(QueryConfig config) {
 }  // namespace
 
 UnknownSpaceQuery::UnknownSpaceQuery(std::shared_ptr<const RobotModel> model,
-                                     UnknownSpaceWatch* watch, bool is_only_reader)
+                                     std::shared_ptr<UnknownSpaceWatch> watch, bool is_only_reader,
+                                     bool is_obstacle)
     : model_(std::move(model)),
-      watch_(*watch),
+      watch_(std::move(watch)),
       is_only_reader_(is_only_reader),
+      is_obstacle_(is_obstacle),
       query_(model_, {}),
       answers_(model_->links.size()),
       surroundings_(model_->links.size()) {}
@@ -33,11 +40,10 @@ void UnknownSpaceQuery::set_model(std::shared_ptr<const RobotModel> model) {
 }
 
 std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vector<bool>& known,
-                                   const std::string& fixed_frame, const QueryConfig& config,
-                                   double influence_distance) {
+                                   const std::string& fixed_frame, const LiveConfig& config) {
   const std::vector<Eigen::Isometry3d>& X_FL = poses.X_FL;
-  if (!is_only_reader_) held_ = watch_.share();
-  const UnknownSnapshot* unknown = is_only_reader_ ? watch_.newest() : held_.get();
+  if (!is_only_reader_) held_ = watch_->share();
+  const UnknownSnapshot* unknown = is_only_reader_ ? watch_->newest() : held_.get();
   std::string problem;
   if (unknown != nullptr) problem = why_unusable(*unknown, *model_, fixed_frame, poses.stamp);
   if (unknown == nullptr || !problem.empty()) {
@@ -47,7 +53,7 @@ std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vec
   placed_.boxes = unknown->boxes;
   placed_.stamp = unknown->stamp;
   placed_.region = {unknown->center_F, unknown->radius};
-  query_.set_config(coarse(config));
+  query_.set_config(coarse(config.query));
   query_.run(X_FL, known, {&placed_}, &results_);
   for (std::size_t i = 0; i < answers_.size(); ++i) {
     answers_[i].lower_bound = std::max(results_[i].lower_bound, deepest(i));  // -inf: out of time
@@ -55,6 +61,7 @@ std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vec
     answers_[i].p_FCl = results_[i].p_FCl;
     answers_[i].p_FCo = results_[i].p_FCo;
   }
+  const double influence_distance = config.repulsion.influence_distance;
   if (influence_distance != surroundings_distance_) {
     surroundings_.assign(surroundings_.size(), std::nullopt);
     surroundings_distance_ = influence_distance;
@@ -67,6 +74,16 @@ std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vec
     break;
   }
   return "";
+}
+
+void UnknownSpaceQuery::fill(std::size_t link, ist_proximity::LinkProximity* message) const {
+  const UnknownSpaceAnswer& answer = answers_[link];
+  assign_unknown_space(answer.seen, answer.lower_bound, answer.direction, is_obstacle_, message);
+}
+
+void UnknownSpaceQuery::draw(std::size_t link, std::size_t place, MarkerScene* scene) const {
+  const UnknownSpaceAnswer& answer = answers_[link];
+  if (answer.p_FCl.allFinite()) scene->unseen.push_back({place, answer.p_FCl, answer.p_FCo});
 }
 
 /// Says that each link may be as deep inside unknown space as it is thick.
@@ -88,8 +105,8 @@ void UnknownSpaceQuery::look_about(std::size_t link, const Eigen::Isometry3d& X_
                                    double influence_distance, const UnknownSnapshot& unknown) {
   std::optional<Surroundings>& surroundings = surroundings_[link];
   if (!surroundings) {
-    surroundings.emplace(model_->links[link], watch_.skin(),
-                         std::max(influence_distance, 2.0 * watch_.skin()));
+    surroundings.emplace(model_->links[link], watch_->skin(),
+                         std::max(influence_distance, 2.0 * watch_->skin()));
   }
   answers_[link].seen = surroundings->look(unknown.seen, X_FL, now);
 }
