@@ -4,6 +4,11 @@
 # it. Those that are named later may use what those before them have made.
 set(add_ons unknown_space trajectory link_pairs)
 set(IST_PROXIMITY_ADD_ONS "${add_ons}" CACHE STRING "Add-ons of the node: a list of ${add_ons}")
+foreach(add_on IN LISTS IST_PROXIMITY_ADD_ONS)
+  if(NOT add_on IN_LIST add_ons)
+    message(FATAL_ERROR "IST_PROXIMITY_ADD_ONS names '${add_on}', which is none of ${add_ons}")
+  endif()
+endforeach()
 
 file(GLOB ros_sources CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}
   src/ros/*.cpp src/ros/*/*.cpp)

@@ -44,22 +44,32 @@ Beam judge(const LaserScan& scan, double range, const RangeLimits& limits) {
 // The sensor's poses, asked beam by beam.
 class SensorMotion {
  public:
-  explicit SensorMotion(Span<const SensorAtBeam> poses) : poses_(poses) {}
+  explicit SensorMotion(Span<const SensorAtBeam> poses) : poses_(poses) {
+    if (poses_.size() > 1) begin_interval();
+  }
 
   // @param beam  not before that of the last call
   // @returns a point that is given in the sensor's frame at this beam, in its frame at the first
   Eigen::Vector3d place(std::size_t beam, const Eigen::Vector3d& p) {
     if (poses_.size() < 2) return p;
-    while (next_ + 1 < poses_.size() && poses_[next_].beam < beam) ++next_;
+    while (next_ + 1 < poses_.size() && poses_[next_].beam < beam) {
+      ++next_;
+      begin_interval();
+    }
     const SensorAtBeam &a = poses_[next_ - 1], &b = poses_[next_];
     const double t = static_cast<double>(beam - a.beam) / static_cast<double>(b.beam - a.beam);
-    const Eigen::Quaterniond q_SA(a.X_SB.linear()), q_SB(b.X_SB.linear());
-    return q_SA.slerp(t, q_SB) * p + (1.0 - t) * a.X_SB.translation() + t * b.X_SB.translation();
+    return q_SA_.slerp(t, q_SB_) * p + (1.0 - t) * a.X_SB.translation() + t * b.X_SB.translation();
   }
 
  private:
+  void begin_interval() {
+    q_SA_ = poses_[next_ - 1].X_SB.linear();
+    q_SB_ = poses_[next_].X_SB.linear();
+  }
+
   Span<const SensorAtBeam> poses_;
-  std::size_t next_ = 1;  // the pose that the beam is before, or in
+  std::size_t next_ = 1;            // the pose that the beam is before, or in
+  Eigen::Quaterniond q_SA_, q_SB_;  // of the poses before and after it
 };
 
 }  // namespace

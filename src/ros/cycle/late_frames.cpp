@@ -27,18 +27,8 @@ void LateFrames::add(const Lag& lag) {
 /// [m] How much nearer to a link an obstacle may have come that is `bound` from it.
 double LateFrames::shift(std::size_t link, double bound, const Lag** lag) const {
   const InnerSphereTree& tree = robot_.links[link].tree;
-  const Eigen::Vector3d center = X_FL_[link] * tree.center();
-  double most = 0.0;
-  for (const Lag* one : lags_) {
-    for (const Eigen::Isometry3d& moved : one->moves()) {
-      const double turned = turn_of(moved) * (tree.radius() + std::max(bound, 0.0));
-      const double there = one->age / one->window * ((moved * center - center).norm() + turned);
-      if (there <= most) continue;
-      most = there;
-      if (lag) *lag = one;
-    }
-  }
-  return most + (links_.empty() ? 0.0 : links_[link]);
+  return within(X_FL_[link] * tree.center(), tree.radius() + std::max(bound, 0.0), lag) +
+         (links_.empty() ? 0.0 : links_[link]);
 }
 
 double LateFrames::range(double max_distance) const {
@@ -79,12 +69,15 @@ void LateFrames::lower(double max_distance, std::vector<LinkProximity>* answers)
   }
 }
 
-double LateFrames::within(const Eigen::Vector3d& center, double radius) const {
+double LateFrames::within(const Eigen::Vector3d& center, double radius, const Lag** lag) const {
   double most = 0.0;
-  for (const Lag* lag : lags_) {
-    for (const Eigen::Isometry3d& moved : lag->moves()) {
-      const double there = (moved * center - center).norm() + turn_of(moved) * radius;
-      most = std::max(most, lag->age / lag->window * there);
+  for (const Lag* one : lags_) {
+    for (const Eigen::Isometry3d& moved : one->moves()) {
+      const double turned = turn_of(moved) * radius;
+      const double there = one->age / one->window * ((moved * center - center).norm() + turned);
+      if (there <= most) continue;
+      most = there;
+      if (lag) *lag = one;
     }
   }
   return most;

@@ -42,7 +42,8 @@ class LateFrames {
   void lower(double max_distance, std::vector<LinkProximity>* answers);
 
   /// [m] How far obstacles within a sphere may have come since, to whatever link.
-  double within(const Eigen::Vector3d& center, double radius) const;
+  /// @param lag  receives the reason where it is not 0; may be null
+  double within(const Eigen::Vector3d& center, double radius, const Lag** lag = nullptr) const;
 
   /// Says so where lower() took more than `tolerance` [m] off; else empty.
   std::string doubt(double tolerance) const;
