@@ -1,10 +1,6 @@
 // Searches for queries that break a promise: random ascent (hill climbing with restarts) over the
 // mesh, the cloud, the poses and the motion of an adversarial case.
 //
-//   adversarial_search [--seconds N] [--seed S] [--keep FILE]
-//   adversarial_search --replay GENOME
-//   adversarial_search --moved-links SCENES [--seed S]
-//
 // For each promise it prints the largest violation found, in metres beyond what is allowed, and the
 // genome that makes it; --replay prints the violations of a genome.
 // --keep appends the worst of each promise to a file, as test/support/adversarial_cases.txt holds
@@ -182,12 +178,12 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   ist::Options options;
-  ist::benchmark::Arguments arguments(argc, argv);
-  options.seconds = arguments.number("seconds", options.seconds);
-  options.seed = arguments.count("seed", options.seed);
-  options.moved_links = static_cast<std::int64_t>(arguments.count("moved-links", 0));
-  options.keep = arguments.text("keep");
-  options.replay = arguments.text("replay");
-  arguments.rest();
+  CLI::App line("Searches for queries that break a promise.");
+  line.add_option("--seconds", options.seconds, "How long to search");
+  line.add_option("--seed", options.seed, "Of the search");
+  line.add_option("--keep", options.keep, "File to which the worst of each promise is appended");
+  line.add_option("--replay", options.replay, "A genome whose violations are printed");
+  line.add_option("--moved-links", options.moved_links, "Scenes of links that move");
+  CLI11_PARSE(line, argc, argv);
   return ist::run(options);
 }

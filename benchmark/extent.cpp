@@ -1,22 +1,20 @@
 // Lower bounds against true surfaces, with the extent of points and without, as Markdown tables.
 //
-// Simulated: spheres, boxes and a table seen by a depth camera with the published noise of a
-// Kinect. Real: Kinect frames of tables, against planes fitted to them; from IST_PROXIMITY_DATA, or
+// Simulated: spheres and a table seen by a depth camera with the published noise of a Kinect. Real:
+// Kinect frames of tables, against planes fitted to them; from IST_PROXIMITY_DATA, or
 // ../shared/data.
-// Usage: extent [--update-doc doc/accuracy.md] [more organized 640 x 480 .pcd files ...]
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <limits>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
-#include "document.h"
+#include "depth_camera.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
@@ -25,291 +23,227 @@
 
 namespace {
 
+using Eigen::Vector3d;
 using ist::ExtentConfig;
+using ist::benchmark::text_of;
 using ist::test::Rng;
 using ist::test::uniform;
+using Points = std::vector<Eigen::Vector3f>;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kMaxRange = 3.0;     // [m]
-constexpr double kTolerance = 0.001;  // [m]
-const std::vector<double> kLinkRadii = {0.01, 0.03, 0.1};
+constexpr double kMaxRange = 3.0;                 // [m]
+constexpr std::array kSigmas = {0.0, 3.0};        // of the extent; 0: points
+constexpr std::array kRadii = {0.01, 0.03, 0.1};  // [m] of the links
+const ist::SensorModel& kModel = *ist::find_sensor_model("kinect_v1");
+
+double sigma(double range) {
+  return kModel.noise_constant + kModel.noise_quadratic * range * range;
+}
 
 // The answers of one configuration.
 struct Tally {
   std::vector<double> gap;    // [m] true distance - lower bound, negative: the bound failed
   std::vector<double> width;  // [m] distance - lower_bound
-  std::vector<double> query_us;
 };
+using Tallies = std::array<Tally, kSigmas.size()>;
 
-// Links that are spheres: their distance to a shape is exact.
-class SphereLinks {
- public:
-  SphereLinks() {
-    std::vector<ist::Shape> shapes;
-    for (const double radius : kLinkRadii) shapes.emplace_back(ist::Sphere{radius});
-    ist::QueryConfig config;
-    config.tolerance = kTolerance;
-    query_ = std::make_unique<ist::ProximityQuery>(ist::test::make_model(shapes, 0.001), config);
-  }
-
-  // @param center    [m] of a sphere, in the cloud's frame
-  // @param distance  [m] of its centre from the true surface
-  void measure(std::size_t link, const Eigen::Vector3d& center, double distance,
-               const ist::CloudSnapshot& cloud, Tally* tally) {
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-    X_FL.translation() = center;
-    ist::LinkProximity answer;
-    ist::benchmark::ThreadTimer timer;
-    query_->run_link(link, X_FL, {&cloud}, &answer);
-    const double us = timer.lap();
-    if (answer.state < ist::LinkState::kNear) return;
-    tally->query_us.push_back(us);
-    tally->gap.push_back(distance - kLinkRadii[link] - answer.lower_bound);
-    tally->width.push_back(answer.distance - answer.lower_bound);
-  }
-
- private:
-  std::unique_ptr<ist::ProximityQuery> query_;
-};
-
-std::string percent(double share) {
-  std::array<char, 32> text;
-  std::snprintf(text.data(), text.size(), "%.2f %%", 100.0 * share);
-  return text.data();
-}
-
-// The share of a normal distribution within k standard deviations.
-double stated_share(double k) { return std::erf(k / std::sqrt(2.0)); }
-
-std::string row(const std::string& scene, const std::string& points, double k, const Tally& tally) {
-  const auto held =
-      std::count_if(tally.gap.begin(), tally.gap.end(), [](double gap) { return gap >= 0.0; });
-  const auto cases = static_cast<double>(tally.gap.size());
-  const double above = std::max(0.0, -ist::benchmark::quantile(tally.gap, 0.0));
-  std::array<char, 160> text;
-  std::snprintf(text.data(), text.size(), " | %zu | %s | %s | %.1f mm | %.1f mm |\n",
-                tally.gap.size(), percent(static_cast<double>(held) / cases).c_str(),
-                k > 0.0 ? percent(stated_share(k)).c_str() : "-", 1e3 * above,
-                1e3 * ist::benchmark::mean(tally.width));
-  return "| " + scene + " | " + points + text.data();
-}
-
-const char* const kHeader =
-    "| scene | points are | cases | `lower_bound` holds | at least | worst | interval, mean |\n"
-    "| --- | --- | --- | --- | --- | --- | --- |\n";
-
-// ---------------------------------------------------------------- simulated
-
-// A table with things on it, in the camera's frame (z forward).
-struct Scene {
-  struct Ball {
-    Eigen::Vector3d center;
-    double radius;
-  };
-  Eigen::Vector3d table_normal;  // towards the camera
-  double table_offset;           // normal . p = offset on the table
-  std::vector<Ball> balls;
-
-  // [m] Signed distance of the nearest surface; positive outside.
-  double distance(const Eigen::Vector3d& p, Eigen::Vector3d* nearest) const {
-    double least = table_normal.dot(p) - table_offset;
-    *nearest = p - least * table_normal;
-    for (const Ball& ball : balls) {
-      const double d = (p - ball.center).norm() - ball.radius;
-      if (d >= least) continue;
-      least = d;
-      *nearest = p - d * (p - ball.center).normalized();
-    }
-    return least;
-  }
-
-  // [m] Along a ray of unit length from the camera; inf: nothing is hit.
-  double range(const Eigen::Vector3d& ray) const {
-    double least = kInfinity;
-    const double along = table_normal.dot(ray);
-    if (along < 0.0) least = table_offset / along;
-    for (const Ball& ball : balls) {
-      const double b = ray.dot(ball.center);
-      const double root = b * b - ball.center.squaredNorm() + ball.radius * ball.radius;
-      if (root >= 0.0 && b > std::sqrt(root)) least = std::min(least, b - std::sqrt(root));
-    }
-    return least;
-  }
-};
-
-Scene random_scene(Rng* rng) {
-  Scene scene;
-  const double tilt = uniform(rng, 0.3, 1.0);  // between the table's normal and the view
-  scene.table_normal = Eigen::Vector3d(0.0, -std::sin(tilt), -std::cos(tilt));
-  scene.table_offset = -uniform(rng, 0.7, 1.8) * std::cos(tilt);
-  for (int i = 0; i < 4; ++i) {
-    const double z = uniform(rng, 0.7, 1.6);
-    scene.balls.push_back({{uniform(rng, -0.3, 0.3) * z, uniform(rng, -0.25, 0.25) * z, z},
-                           uniform(rng, 0.02, 0.12)});
-  }
-  return scene;
-}
-
-struct Camera {
-  std::size_t width, height;
-  double focal_length;  // [pixels]
-  Eigen::Vector3d ray(std::size_t u, std::size_t v) const {
-    const auto x = static_cast<double>(u) - 0.5 * static_cast<double>(width - 1);
-    const auto y = static_cast<double>(v) - 0.5 * static_cast<double>(height - 1);
-    return Eigen::Vector3d(x / focal_length, y / focal_length, 1.0).normalized();
-  }
-  bool sees(const Eigen::Vector3d& p) const {
-    return p.z() > 0.1 &&
-           std::abs(p.x() / p.z()) * focal_length < 0.49 * static_cast<double>(width) &&
-           std::abs(p.y() / p.z()) * focal_length < 0.49 * static_cast<double>(height);
-  }
-};
-
-// What is wrong with what the camera says.
-struct Errors {
-  double a = 0.0, b = 0.0;          // noise, as ExtentConfig has it
-  double offset = 0.0, turn = 0.0;  // [m], [rad]: largest calibration errors
-};
-
-std::vector<Eigen::Vector3d> image(const Scene& scene, const Camera& camera, const Errors& errors,
-                                   Rng* rng) {
-  std::normal_distribution<double> normal;
-  Eigen::Isometry3d wrong = Eigen::Isometry3d::Identity();
-  const Eigen::Vector3d axis = ist::test::random_vector(rng, 1.0).normalized();
-  wrong.linear() =
-      Eigen::AngleAxisd(uniform(rng, -errors.turn, errors.turn), axis).toRotationMatrix();
-  wrong.translation() =
-      uniform(rng, 0.0, errors.offset) * ist::test::random_vector(rng, 1.0).normalized();
-  std::vector<Eigen::Vector3d> points;
-  points.reserve(camera.width * camera.height);
-  for (std::size_t v = 0; v < camera.height; ++v) {
-    for (std::size_t u = 0; u < camera.width; ++u) {
-      const Eigen::Vector3d ray = camera.ray(u, v);
-      const double range = scene.range(ray);
-      const double sigma = errors.a + errors.b * range * range;
-      const double read = range < kMaxRange ? range + sigma * normal(*rng)
-                                            : std::numeric_limits<double>::quiet_NaN();
-      points.emplace_back(wrong * (read * ray));
-    }
-  }
-  return points;
-}
-
-template <class Point>
-ist::RawCloud raw_image(const std::vector<Point>& points, std::size_t width) {
-  using Scalar = typename Point::Scalar;
-  ist::RawCloud raw;
-  raw.data = reinterpret_cast<const std::uint8_t*>(points.data());
-  raw.width = width;
-  raw.height = points.size() / width;
-  raw.point_step = sizeof(Point);
-  raw.row_step = width * sizeof(Point);
-  raw.y = sizeof(Scalar);
-  raw.z = 2 * sizeof(Scalar);
-  raw.is_double = sizeof(Scalar) == 8;
-  return raw;
-}
-
-template <class Point>
-ist::CloudSnapshot ingest(const std::vector<Point>& points, std::size_t width,
-                          const ExtentConfig& extent) {
-  ist::IngestConfig config;
-  config.max_range = kMaxRange;
-  config.self_filter = false;
-  config.extent = extent;
-  ist::CloudSnapshot snapshot;
-  ist::Ingest(config).run(raw_image(points, width), Eigen::Isometry3d::Identity(), {}, 0.0,
-                          &snapshot);
-  return snapshot;
-}
-
-ExtentConfig kinect(double k, bool footprint) {
-  const ist::SensorModel& model = *ist::find_sensor_model("kinect_v1");
-  ExtentConfig config;
-  config.noise_constant = model.noise_constant;
-  config.noise_quadratic = model.noise_quadratic;
-  config.sigmas = k;
-  if (!footprint) return config;
-  config.footprint = ExtentConfig::Footprint::kCamera;
-  config.field_of_view = model.field_of_view;
-  return config;
-}
-
-// Places whose nearest true surface the camera sees.
+// A link at a place whose distance from the true surface is known.
 struct Place {
-  Eigen::Vector3d center;
-  double distance;
+  Vector3d center;
+  double distance;  // [m]
   std::size_t link;
 };
 
-std::vector<Place> random_places(const Scene& scene, const Camera& camera, int count, Rng* rng) {
+// What is stated of a camera's errors, and what they are.
+struct Calibration {
+  double offset = 0.0, angle = 0.0;  // [m], [rad]
+};
+
+ExtentConfig extent_of(double sigmas, const Calibration& calibration) {
+  ExtentConfig config;
+  if (sigmas == 0.0) return config;
+  config.noise_constant = kModel.noise_constant;
+  config.noise_quadratic = kModel.noise_quadratic;
+  config.sigmas = sigmas;
+  config.footprint = ExtentConfig::Footprint::kCamera;
+  config.field_of_view = kModel.field_of_view;
+  config.calibration = calibration.offset;
+  config.calibration_angle = calibration.angle;
+  return config;
+}
+
+// Asks links that are spheres: their distance to a shape is exact.
+void measure(const Points& image, std::size_t width, const Eigen::Isometry3d& X_FS,
+             const Calibration& calibration, const std::vector<Place>& places, Tallies* tallies) {
+  static const auto model = ist::test::make_model(
+      {ist::Sphere{kRadii[0]}, ist::Sphere{kRadii[1]}, ist::Sphere{kRadii[2]}}, 0.001);
+  ist::ProximityQuery query(model, {});
+  for (std::size_t k = 0; k < kSigmas.size(); ++k) {
+    ist::IngestConfig config;
+    config.max_range = kMaxRange;
+    config.self_filter = false;
+    config.extent = extent_of(kSigmas[k], calibration);
+    ist::CloudSnapshot cloud;
+    ist::Ingest(config).run(ist::packed_cloud(image.front().data(), width, image.size() / width),
+                            X_FS, {}, 0.0, &cloud);
+    for (const Place& place : places) {
+      const Eigen::Isometry3d X_FL(Eigen::Translation3d(place.center));
+      ist::LinkProximity answer;
+      query.run_link(place.link, X_FL, {&cloud}, &answer);
+      if (answer.state < ist::LinkState::kNear) continue;
+      (*tallies)[k].gap.push_back(place.distance - kRadii[place.link] - answer.lower_bound);
+      (*tallies)[k].width.push_back(answer.distance - answer.lower_bound);
+    }
+  }
+}
+
+std::string rows(const std::string& scene, const Tallies& tallies) {
+  std::string text;
+  for (std::size_t k = 0; k < kSigmas.size(); ++k) {
+    const auto& gap = tallies[k].gap;
+    const auto held = std::count_if(gap.begin(), gap.end(), [](double one) { return one >= 0.0; });
+    const bool is_points = kSigmas[k] == 0.0;
+    const std::string points = is_points ? "points" : text_of("k = %.0f", kSigmas[k]);
+    // The share of a normal distribution within k standard deviations.
+    const double stated = 100.0 * std::erf(kSigmas[k] / std::sqrt(2.0));
+    text += text_of("| %s | %s | %zu | %.2f %% | %s | %.1f mm | %.1f mm |\n", scene.c_str(),
+                    points.c_str(), gap.size(),
+                    100.0 * static_cast<double>(held) / static_cast<double>(gap.size()),
+                    is_points ? "-" : text_of("%.2f %%", stated).c_str(),
+                    1e3 * std::max(0.0, -ist::benchmark::quantile(gap, 0.0)),
+                    1e3 * ist::benchmark::mean(tallies[k].width));
+  }
+  return text;
+}
+
+// ---------------------------------------------------------------- simulated
+
+// A table with balls on it, in the camera's frame (z forward).
+class Scene {
+ public:
+  explicit Scene(Rng* rng) {
+    const double tilt = uniform(rng, 0.3, 1.0);  // between the table's normal and the view
+    normal_ = {0.0, -std::sin(tilt), -std::cos(tilt)};
+    offset_ = -uniform(rng, 0.7, 1.8) * std::cos(tilt);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double z = uniform(rng, 0.7, 1.6);
+      centers_.emplace_back(uniform(rng, -0.3, 0.3) * z, uniform(rng, -0.25, 0.25) * z, z);
+      radii_.push_back(uniform(rng, 0.02, 0.12));
+      shapes_.emplace_back(ist::Sphere{radii_[i]});
+    }
+    shapes_.emplace_back(ist::Box{{20.0, 20.0, kThickness}});
+  }
+
+  // The shapes, for as long as this is.
+  std::vector<ist::sim::Body> bodies() const {
+    std::vector<ist::sim::Body> all;
+    for (std::size_t i = 0; i < centers_.size(); ++i) {
+      all.push_back({&shapes_[i], Eigen::Isometry3d(Eigen::Translation3d(centers_[i]))});
+    }
+    const auto turn = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal_);
+    const Vector3d middle = (offset_ - 0.5 * kThickness) * normal_;
+    all.push_back({&shapes_.back(), Eigen::Translation3d(middle) * Eigen::Isometry3d(turn)});
+    return all;
+  }
+
+  // [m] Signed distance of the nearest surface; positive outside.
+  double distance(const Vector3d& p, Vector3d* nearest) const {
+    double least = normal_.dot(p) - offset_;
+    *nearest = p - least * normal_;
+    for (std::size_t i = 0; i < centers_.size(); ++i) {
+      const double d = (p - centers_[i]).norm() - radii_[i];
+      if (d >= least) continue;
+      least = d;
+      *nearest = p - d * (p - centers_[i]).normalized();
+    }
+    return least;
+  }
+
+ private:
+  static constexpr double kThickness = 0.1;  // [m] of the table
+
+  Vector3d normal_;  // of the table, towards the camera
+  double offset_;    // normal . p on the table
+  std::vector<Vector3d> centers_;
+  std::vector<double> radii_;
+  std::vector<ist::sim::RayShape> shapes_;
+};
+
+bool hides(const ist::sim::Body& body, const Vector3d& p) {
+  const Eigen::Isometry3d X_SF = body.X_FS.inverse();
+  return body.shape->hit({X_SF.translation(), X_SF.linear() * p}) < 1.0 - 1e-9;
+}
+
+// Places whose nearest true surface the camera sees.
+std::vector<Place> random_places(const Scene& scene, const ist::sim::DepthCamera& camera,
+                                 Rng* rng) {
+  constexpr std::size_t kPlaces = 100;
+  const auto bodies = scene.bodies();
   std::vector<Place> places;
-  for (int i = 0; i < 100 * count && static_cast<int>(places.size()) < count; ++i) {
+  while (places.size() < kPlaces) {
     const double z = uniform(rng, 0.5, 1.8);
     Place place{{uniform(rng, -0.4, 0.4) * z, uniform(rng, -0.3, 0.3) * z, z}, 0.0, 0};
     place.link = static_cast<std::size_t>(uniform(rng, 0, 2.999));
-    Eigen::Vector3d nearest;
+    Vector3d nearest;
     place.distance = scene.distance(place.center, &nearest);
-    const double gap = place.distance - kLinkRadii[place.link];
-    if (gap < 0.005 || gap > 0.3 || !camera.sees(nearest)) continue;
-    if (scene.range(nearest.normalized()) < nearest.norm() - 1e-9) continue;  // hidden
+    const double gap = place.distance - kRadii[place.link];
+    if (gap < 0.005 || gap > 0.3 || !camera.has_in_view(nearest)) continue;
+    if (std::any_of(bodies.begin(), bodies.end(),
+                    [&](const ist::sim::Body& body) { return hides(body, nearest); })) {
+      continue;
+    }
     places.push_back(place);
   }
   return places;
 }
 
-struct SimulatedCase {
-  std::string name;
-  Camera camera;
-  Errors errors;
-  double calibration, calibration_angle;
-};
-
-void simulate(const SimulatedCase& simulated, std::string* table) {
-  const std::vector<double> ks = {0.0, 3.0};
-  std::vector<Tally> tallies(ks.size());
-  SphereLinks links;
+// @param calibration  the largest errors, which are stated, too
+std::string simulate(const std::string& name, int width, bool is_noisy,
+                     const Calibration& calibration) {
+  ist::sim::DepthCameraConfig config;
+  config.width = width;
+  config.height = width * 3 / 4;
+  config.focal_length = 0.5 * (width - 1) / std::tan(0.5 * kModel.field_of_view);
+  config.max_depth = kMaxRange;
+  config.noise = 0.0;
+  const ist::sim::DepthCamera camera(config, {});
+  config.focal_length *= 50.0 / 49.0;
+  const ist::sim::DepthCamera inner(config, {});  // without the outermost pixels
+  std::normal_distribution<double> normal;
+  Tallies tallies;
   Rng rng(19);
   for (int i = 0; i < 40; ++i) {
-    const Scene scene = random_scene(&rng);
-    const std::vector<Eigen::Vector3d> points =
-        image(scene, simulated.camera, simulated.errors, &rng);
-    const std::vector<Place> places = random_places(scene, simulated.camera, 100, &rng);
-    for (std::size_t k = 0; k < ks.size(); ++k) {
-      ExtentConfig extent = kinect(ks[k], true);
-      extent.calibration = simulated.calibration;
-      extent.calibration_angle = simulated.calibration_angle;
-      if (ks[k] == 0.0) extent = ExtentConfig();
-      const ist::CloudSnapshot cloud = ingest(points, simulated.camera.width, extent);
-      for (const Place& place : places) {
-        links.measure(place.link, place.center, place.distance, cloud, &tallies[k]);
-      }
+    const Scene scene(&rng);
+    Points image = camera.picture(scene.bodies(), &rng);
+    for (Eigen::Vector3f& p : image) {
+      const auto range = static_cast<double>(p.norm());
+      if (is_noisy) p *= static_cast<float>(1.0 + sigma(range) / range * normal(rng));
     }
+    const double angle = uniform(&rng, -calibration.angle, calibration.angle);
+    const Vector3d axis = ist::test::random_vector(&rng, 1.0).normalized();
+    const Vector3d off = ist::test::random_vector(&rng, 1.0).normalized();
+    const Eigen::Isometry3d X_FS =
+        Eigen::Translation3d(uniform(&rng, 0.0, calibration.offset) * off) *
+        Eigen::Isometry3d(Eigen::AngleAxisd(angle, axis));
+    measure(image, static_cast<std::size_t>(width), X_FS, calibration,
+            random_places(scene, inner, &rng), &tallies);
   }
-  for (std::size_t k = 0; k < ks.size(); ++k) {
-    std::array<char, 32> points;
-    std::snprintf(points.data(), points.size(), "k = %.0f", ks[k]);
-    *table += row(simulated.name, ks[k] == 0.0 ? "points" : points.data(), ks[k], tallies[k]);
-    std::printf("%s, k = %.0f: query p50 / p99 %.1f / %.1f us\n", simulated.name.c_str(), ks[k],
-                ist::benchmark::quantile(tallies[k].query_us, 0.5),
-                ist::benchmark::quantile(tallies[k].query_us, 0.99));
-  }
+  return rows(name, tallies);
 }
 
 // ---------------------------------------------------------------- real
 
 struct Plane {
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // towards the camera
+  Vector3d normal = Vector3d::Zero();  // towards the camera
   double offset = 0.0;
-  double height(const Eigen::Vector3d& p) const { return normal.dot(p) - offset; }
+  double height(const Vector3d& p) const { return normal.dot(p) - offset; }
 };
 
-Plane fit(const std::vector<Eigen::Vector3d>& points) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& p : points) mean += p;
+Plane fit(const std::vector<Vector3d>& points) {
+  Vector3d mean = Vector3d::Zero();
+  for (const Vector3d& p : points) mean += p;
   mean /= static_cast<double>(points.size());
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& p : points) spread += (p - mean) * (p - mean).transpose();
+  for (const Vector3d& p : points) spread += (p - mean) * (p - mean).transpose();
   Plane plane;
   plane.normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
   if (plane.normal.dot(mean) > 0.0) plane.normal = -plane.normal;
@@ -317,22 +251,22 @@ Plane fit(const std::vector<Eigen::Vector3d>& points) {
   return plane;
 }
 
-std::vector<Eigen::Vector3d> near_plane(const std::vector<Eigen::Vector3d>& points,
-                                        const Plane& plane, double within) {
-  std::vector<Eigen::Vector3d> near;
-  for (const Eigen::Vector3d& p : points) {
+std::vector<Vector3d> near_plane(const std::vector<Vector3d>& points, const Plane& plane,
+                                 double within) {
+  std::vector<Vector3d> near;
+  for (const Vector3d& p : points) {
     if (std::abs(plane.height(p)) < within) near.push_back(p);
   }
   return near;
 }
 
 // The plane with the most points within 1 cm, then a least squares fit of those within 2 cm.
-Plane find_table(const std::vector<Eigen::Vector3d>& points, Rng* rng) {
+Plane find_table(const std::vector<Vector3d>& points, Rng* rng) {
   std::uniform_int_distribution<std::size_t> any(0, points.size() - 1);
   Plane best;
   std::size_t most = 0;
   for (int i = 0; i < 300; ++i) {
-    const Eigen::Vector3d a = points[any(*rng)], b = points[any(*rng)], c = points[any(*rng)];
+    const Vector3d a = points[any(*rng)], b = points[any(*rng)], c = points[any(*rng)];
     Plane plane;
     plane.normal = (b - a).cross(c - a).normalized();
     plane.offset = plane.normal.dot(a);
@@ -349,22 +283,22 @@ Plane find_table(const std::vector<Eigen::Vector3d>& points, Rng* rng) {
 }
 
 // Places above the table, with nothing but the table near their foot.
-std::vector<Place> places_above(const std::vector<Eigen::Vector3d>& points, const Plane& table,
-                                int count, Rng* rng) {
-  const std::vector<Eigen::Vector3d> on_table = near_plane(points, table, 0.02);
+std::vector<Place> places_above(const std::vector<Vector3d>& points, const Plane& table,
+                                std::size_t count, Rng* rng) {
+  const std::vector<Vector3d> on_table = near_plane(points, table, 0.02);
   std::uniform_int_distribution<std::size_t> any(0, on_table.size() - 1);
   std::vector<Place> places;
-  for (int i = 0; i < 100 * count && static_cast<int>(places.size()) < count; ++i) {
-    const Eigen::Vector3d seen = on_table[any(*rng)];
-    const Eigen::Vector3d foot = seen - table.height(seen) * table.normal;
+  for (std::size_t i = 0; i < 100 * count && places.size() < count; ++i) {
+    const Vector3d seen = on_table[any(*rng)];
+    const Vector3d foot = seen - table.height(seen) * table.normal;
     Place place;
     place.link = static_cast<std::size_t>(uniform(rng, 0, 2.999));
-    place.distance = kLinkRadii[place.link] + uniform(rng, 0.005, 0.15);
+    place.distance = kRadii[place.link] + uniform(rng, 0.005, 0.15);
     place.center = foot + place.distance * table.normal;
     // No other thing is as near, nor in the shape of a lower ground beside the table.
     int beside = 0;
     bool is_free = true;
-    for (const Eigen::Vector3d& p : points) {
+    for (const Vector3d& p : points) {
       const double from_foot_sq = (p - foot).squaredNorm();
       beside += from_foot_sq < 0.03 * 0.03 ? 1 : 0;
       const bool near = (p - place.center).norm() < place.distance + 0.02;
@@ -375,85 +309,51 @@ std::vector<Place> places_above(const std::vector<Eigen::Vector3d>& points, cons
   return places;
 }
 
-void measure_frame(const std::vector<Eigen::Vector3f>& frame, Tally* residuals,
-                   std::vector<Tally>* tallies, const std::vector<double>& ks) {
+// @param residuals  [standard deviations] of points from the table, along their rays
+void measure_frame(const Points& frame, std::vector<double>* residuals, Tallies* tallies) {
   Rng rng(7);
-  std::vector<Eigen::Vector3d> points;
+  std::vector<Vector3d> points;
   for (const Eigen::Vector3f& p : frame) {
     if (p.allFinite() && p.norm() < 1.8F) points.emplace_back(p.cast<double>());
   }
-  if (points.size() < 20000) return;
   const Plane table = find_table(points, &rng);
-  const ist::SensorModel& model = *ist::find_sensor_model("kinect_v1");
-  for (const Eigen::Vector3d& p : near_plane(points, table, 0.02)) {
-    // The error along the ray, in standard deviations.
+  for (const Vector3d& p : near_plane(points, table, 0.02)) {
     const double along = std::abs(table.normal.dot(p.normalized()));
-    const double sigma = model.noise_constant + model.noise_quadratic * p.squaredNorm();
-    residuals->gap.push_back(std::abs(table.height(p)) / along / sigma);
+    residuals->push_back(std::abs(table.height(p)) / along / sigma(p.norm()));
   }
-  const std::vector<Place> places = places_above(points, table, 150, &rng);
-  SphereLinks links;
-  for (std::size_t k = 0; k < ks.size(); ++k) {
-    const ist::CloudSnapshot cloud =
-        ingest(frame, 640, ks[k] == 0.0 ? ExtentConfig() : kinect(ks[k], true));
-    for (const Place& place : places) {
-      links.measure(place.link, place.center, place.distance, cloud, &(*tallies)[k]);
-    }
-  }
+  measure(frame, 640, Eigen::Isometry3d::Identity(), {}, places_above(points, table, 150, &rng),
+          tallies);
 }
 
-std::string measure_real(const std::vector<std::string>& files, std::string* table) {
-  const std::vector<double> ks = {0.0, 3.0};
-  std::vector<Tally> tallies(ks.size());
-  Tally residuals;
-  for (const std::string& file : files) {
-    measure_frame(ist::test::read_pcd(file), &residuals, &tallies, ks);
-  }
-  if (residuals.gap.empty()) return "";
-  for (std::size_t k = 0; k < ks.size(); ++k) {
-    std::array<char, 32> points;
-    std::snprintf(points.data(), points.size(), "k = %.0f", ks[k]);
-    *table +=
-        row("real Kinect, tables", ks[k] == 0.0 ? "points" : points.data(), ks[k], tallies[k]);
+std::string measure_real(const std::filesystem::path& data) {
+  Tallies tallies;
+  std::vector<double> residuals;
+  for (const char* name : {"mosd0.pcd", "mosd10.pcd", "mosd40.pcd"}) {
+    measure_frame(ist::test::read_pcd((data / "clouds" / name).string()), &residuals, &tallies);
   }
   const auto within = [&](double k) {
-    const auto count = std::count_if(residuals.gap.begin(), residuals.gap.end(),
-                                     [k](double error) { return error <= k; });
-    return percent(static_cast<double>(count) / static_cast<double>(residuals.gap.size()));
+    const auto count =
+        std::count_if(residuals.begin(), residuals.end(), [k](double error) { return error <= k; });
+    return 100.0 * static_cast<double>(count) / static_cast<double>(residuals.size());
   };
-  std::array<char, 256> text;
-  std::snprintf(text.data(), text.size(),
-                "Of %zu points of the real tables, %s, %s and %s are within 1, 2 and 3 standard "
-                "deviations of the plane.\n",
-                residuals.gap.size(), within(1.0).c_str(), within(2.0).c_str(),
-                within(3.0).c_str());
-  return text.data();
+  return rows("real Kinect, tables", tallies) +
+         text_of(
+             "\nOf %zu points of the real tables, %.2f %%, %.2f %% and %.2f %% are within 1, 2 and "
+             "3 standard deviations of the plane.\n",
+             residuals.size(), within(1.0), within(2.0), within(3.0));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  ist::benchmark::CommandLine line("Lower bounds against true surfaces, for points with extent.");
+  line.read(argc, argv);
   const std::filesystem::path data = ist::benchmark::data_or_exit();
-  ist::benchmark::Arguments arguments(argc, argv);
-  const std::string document = arguments.text("update-doc");
-  std::vector<std::string> files = arguments.rest();
-  for (const char* name : {"mosd0.pcd", "mosd10.pcd", "mosd40.pcd"}) {
-    files.push_back((data / "clouds" / name).string());
-  }
-  const ist::SensorModel& model = *ist::find_sensor_model("kinect_v1");
-  const Errors noise{model.noise_constant, model.noise_quadratic, 0.0, 0.0};
-  Errors calibration = noise;
-  calibration.offset = 0.005;
-  calibration.turn = 0.005;
-  const double half = std::tan(0.5 * model.field_of_view);
-  const Camera fine{320, 240, 319.0 / (2.0 * half)}, coarse{80, 60, 79.0 / (2.0 * half)};
-  std::string table = kHeader;
-  simulate({"320 x 240, noise", fine, noise, 0.0, 0.0}, &table);
-  simulate({"80 x 60, no noise", coarse, {}, 0.0, 0.0}, &table);
-  simulate({"80 x 60, noise", coarse, noise, 0.0, 0.0}, &table);
-  simulate({"320 x 240, noise, calibration", fine, calibration, 0.005, 0.005}, &table);
-  const std::string points = measure_real(files, &table);
-  std::printf("%s\n%s", table.c_str(), points.c_str());
-  if (document.empty()) return 0;
-  return ist::benchmark::write_table(document, "extent", table + "\n" + points) ? 0 : 1;
+  const std::string table =
+      "| scene | points are | cases | `lower_bound` holds | at least | worst | interval, mean |\n"
+      "| --- | --- | --- | --- | --- | --- | --- |\n" +
+      simulate("320 x 240, noise", 320, true, {}) + simulate("80 x 60, no noise", 80, false, {}) +
+      simulate("80 x 60, noise", 80, true, {}) +
+      simulate("320 x 240, noise, calibration", 320, true, {0.005, 0.005}) + measure_real(data);
+  return line.publish("extent", table);
 }

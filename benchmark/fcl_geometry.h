@@ -14,7 +14,7 @@ namespace ist::benchmark {
 inline std::shared_ptr<fcl::CollisionGeometryd> fcl_mesh(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<fcl::Triangle>& faces) {
   auto model = std::make_shared<fcl::BVHModel<fcl::OBBRSSd>>();
-  model->beginModel();
+  model->beginModel(static_cast<int>(faces.size()), static_cast<int>(vertices.size()));
   model->addSubModel(vertices, faces);
   model->endModel();
   return model;

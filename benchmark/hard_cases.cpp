@@ -1,241 +1,232 @@
-// Queries in scenes where branch and bound has little to prune: ties, near-ties, contact,
-// enclosure. For each scene, cloud and tolerance: times on a motion at 1 kHz, of the same pose
-// asked again, of the first query after an image, and cold; exact evaluations; answers against
-// brute force.
-//
-// Prints a table of medians as it goes, and writes everything as CSV. With --deadline: what stopped
-// queries know, and how late they are.
+// Queries where branch and bound has little to prune, as CSV files:
+// - hard.csv, scenes of ties, near-ties, contact and enclosure: times on a motion at 1 kHz, of the
+//   same pose asked again, of the first query after an image, and cold; answers against brute
+//   force;
+// - near.csv, by the distance of the nearest link: motions among Kinect frames, each step raised or
+//   lowered so that the nearest link has that distance;
+// - deadline.csv, the hard scenes again: what stopped queries know, and how late they are.
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "hard_cases/deadline.h"
-#include "hard_cases/measure.h"
-#include "near_touch/motions.h"
+#include "hard_cases/near.h"
+#include "hard_cases/scene.h"
+#include "hard_cases/trial.h"
+#include "ist_proximity/cloud/ingest.h"
 #include "support.h"
 #include "support/data_dir.h"
+#include "support/whole_cloud.h"
 
+namespace ist::benchmark {
 namespace {
 
-using ist::benchmark::Asked;
-using ist::benchmark::HardScene;
-using ist::benchmark::Measured;
-using ist::benchmark::quantile;
-using ist::benchmark::Setting;
-using ist::benchmark::Stopped;
-using ist::benchmark::Times;
+const double kMaxError = PackingConfig().max_error;  // [m]
+constexpr std::array kTolerances = {0.001, 0.0};     // [m]
+constexpr std::array kNoises = {0.0, 0.001};         // [m]
+constexpr std::array kDistances = {0.3, 0.05, 0.02, 0.005, 0.002, 0.0005, -0.001, -0.005, -0.05};
 
 struct Options {
-  std::vector<std::string> scenes, links;
-  std::vector<double> noise_mm{0.0, 0.3, 1.0, 3.0}, tolerance_mm{1.0, 0.0};
-  std::vector<std::size_t> points{10000, 100000, 300000};
-  std::vector<double> deadlines;  // shares of the full query's time; empty: no deadline
-  double max_error_mm = 1e3 * ist::PackingConfig().max_error;
-  Setting setting;
-  std::string csv, cache;
-  bool list = false;
+  std::string folder, cache, only;
+  bool quick = false;
 };
 
-std::vector<HardScene> all_scenes(const std::string& cache) {
-  std::vector<HardScene> scenes = ist::benchmark::body_scenes();
-  for (HardScene& scene : ist::benchmark::arm_scenes()) scenes.push_back(std::move(scene));
-  const auto data = ist::test::data_dir();
-  if (!data) {
-    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
-    return scenes;
-  }
-  for (HardScene& scene : ist::benchmark::recorded_scenes(*data, cache)) {
-    scenes.push_back(std::move(scene));
-  }
-  return scenes;
+// The values that all rows of one kind of queries have.
+CsvFile& add_times(const Times& times, std::size_t asked, CsvFile* csv) {
+  return csv->add("asked", kAskedNames[asked])
+      .add("queries", times.us.size())
+      .add("median_us", quantile(times.us, 0.5))
+      .add("p99_us", quantile(times.us, 0.99))
+      .add("max_us", quantile(times.us, 1.0));
 }
 
-// Whether the name contains one of the words, or there are none.
-bool is_wanted(const std::string& name, const std::vector<std::string>& words) {
-  return words.empty() || std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-           return name.find(word) != std::string::npos;
-         });
+CsvFile& add_setting(const HardScene& scene, const Setting& setting, CsvFile* csv) {
+  return csv->add("scene", scene.name)
+      .add("link", scene.link)
+      .add("points", setting.points)
+      .add("noise_mm", 1e3 * setting.noise)
+      .add("tolerance_mm", 1e3 * setting.tolerance)
+      .add("max_error_mm", 1e3 * kMaxError);
 }
 
-void print(std::FILE* csv, const HardScene& scene, const Setting& setting, double max_error_mm,
-           const Measured& measured) {
-  for (const Times& times : measured.times) {
-    if (times.us.empty()) continue;
-    std::fprintf(
-        csv, "\"%s\",\"%s\",%zu,%g,%g,%g,\"%s\",%zu,%.2f,%.2f,%.2f,%.0f,%.4f,%zu,%zu,%.5f\n",
-        scene.name.c_str(), scene.link.c_str(), setting.points, 1e3 * setting.noise,
-        1e3 * setting.tolerance, max_error_mm, name_of(times.asked), times.us.size(),
-        quantile(times.us, 0.5), quantile(times.us, 0.99), quantile(times.us, 1.0),
-        quantile(times.evaluations, 0.5), 1e3 * quantile(times.nearest, 0.5),
-        measured.checked.answers, measured.checked.wrong, 1e3 * measured.checked.largest_width);
+void write_times(const HardScene& scene, const Setting& setting, const Measured& measured,
+                 CsvFile* csv) {
+  for (std::size_t asked = 0; asked < kAsked; ++asked) {
+    if (measured.times[asked].us.empty()) continue;
+    add_setting(scene, setting, csv);
+    add_times(measured.times[asked], asked, csv)
+        .add("checked", measured.checked.answers)
+        .add("wrong", measured.checked.wrong)
+        .add("largest_width_mm", 1e3 * measured.checked.largest_width)
+        .end_row();
   }
-  std::fflush(csv);
 }
 
-void print_line(const HardScene& scene, const Setting& setting, const Measured& measured) {
-  std::printf("| %s | %s | %zu | %g | %g |", scene.name.c_str(), scene.link.c_str(), setting.points,
-              1e3 * setting.noise, 1e3 * setting.tolerance);
-  for (const Times& times : measured.times) {
-    std::printf(" %.0f / %.0f |", quantile(times.us, 0.5), quantile(times.us, 1.0));
+// @returns the number of wrong bounds
+std::size_t write_stopped(const HardScene& scene, const Setting& setting, const Measured& measured,
+                          CsvFile* csv) {
+  std::size_t wrong = 0;
+  for (std::size_t asked = 0; asked < kAsked; ++asked) {
+    const Times& times = measured.times[asked];
+    for (std::size_t i = 0; i < setting.shares.size(); ++i) {
+      const Stopped& s = times.stopped[i];
+      wrong += s.wrong;
+      add_setting(scene, setting, csv)
+          .add("asked", kAskedNames[asked])
+          .add("share", setting.shares[i])
+          .add("queries", s.queries)
+          .add("stopped", s.stopped)
+          .add("full_us", quantile(times.us, 0.5))
+          .add("links", s.links)
+          .add("unknown", s.unknown)
+          .add("free_links", s.free_links)
+          .add("proven_free", s.proven_free)
+          .add("width_mm", 1e3 * quantile(s.width, 0.5))
+          .add("overrun_max_us", quantile(s.overrun_us, 1.0))
+          .add("wrong", s.wrong)
+          .end_row();
+    }
   }
-  std::printf(" %.0f | %zu of %zu |\n", quantile(measured.times[0].evaluations, 0.5),
-              measured.checked.wrong, measured.checked.answers);
-  std::fflush(stdout);
+  return wrong;
 }
 
-void print_header(std::FILE* csv) {
-  std::printf("| scene | link | points | noise [mm] | tolerance [mm] |");
-  for (const Asked asked : ist::benchmark::kAllAsked) {
-    std::printf(" %s, median / largest [µs] |", name_of(asked));
+Setting hard_setting(bool quick) {
+  Setting setting;
+  if (!quick) return setting;
+  setting.steps = 50;
+  setting.cold = setting.images = 3;
+  setting.budget = 0.3;
+  setting.checks = 1;
+  return setting;
+}
+
+Setting deadline_setting(bool quick) {
+  Setting setting;
+  setting.steps = quick ? 60 : 1000;
+  setting.cold = quick ? 5 : 20;
+  setting.images = quick ? 5 : 100;
+  setting.budget = quick ? 0.5 : 20.0;
+  setting.checks = 0;
+  setting.shares = {0.05, 0.1, 0.25, 0.5, 0.75, 1.0};
+  return setting;
+}
+
+/// @returns the number of wrong answers
+std::size_t measure_scene(const HardScene& scene, const Options& options, CsvFile* hard,
+                          CsvFile* deadline) {
+  std::fprintf(stderr, "%s\n", scene.name.c_str());
+  const auto model = packed(scene.robot, options.cache, kMaxError);
+  std::size_t wrong = 0;
+  for (const double noise : kNoises) {
+    if (scene.is_recorded && noise > 0.0) continue;
+    for (const double tolerance : kTolerances) {
+      Setting setting = hard_setting(options.quick);
+      setting.noise = noise;
+      setting.tolerance = tolerance;
+      Measured measured;
+      measure(scene, model, setting, &measured);
+      write_times(scene, setting, measured, hard);
+      wrong += measured.checked.wrong;
+    }
+    Setting setting = deadline_setting(options.quick);
+    setting.noise = noise;
+    Measured measured;
+    measure(scene, model, setting, &measured);
+    wrong += write_stopped(scene, setting, measured, deadline);
   }
-  std::printf(" evaluations, warm | wrong |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-  if (csv == nullptr) return;
-  std::fprintf(csv,
-               "scene,link,points,noise_mm,tolerance_mm,max_error_mm,asked,queries,median_us,"
-               "p99_us,max_us,evaluations,nearest_mm,checked,wrong,largest_width_mm\n");
+  return wrong;
 }
 
-void print_deadline_header(std::FILE* csv) {
-  std::printf(
-      "| scene | link | points | noise [mm] | tolerance [mm] | asked | deadline | full [µs] | "
-      "free links with a bound above 0 | UNKNOWN | width median / p90 [mm] | "
-      "overrun p99.9 / largest [µs] | wrong |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-  if (csv == nullptr) return;
-  std::fprintf(csv,
-               "scene,link,points,noise_mm,tolerance_mm,max_error_mm,asked,share,queries,"
-               "stopped,full_us,links,unknown,free_links,proven_free,width_mm,width_p90_mm,"
-               "width_p99_mm,overrun_us,overrun_p99_us,overrun_p999_us,overrun_max_us,wrong\n");
-}
-
-void print(std::FILE* csv, const HardScene& scene, const Setting& setting, double max_error_mm,
-           const Stopped& s) {
-  const char* asked = name_of(s.asked);
-  const double width = 1e3 * quantile(s.width, 0.5), width_p90 = 1e3 * quantile(s.width, 0.9);
-  const double late = quantile(s.overrun_us, 0.999), latest = quantile(s.overrun_us, 1.0);
-  std::string free = "all in contact";
-  if (s.free_links > 0) {
-    const std::size_t percent = 100 * s.proven_free / s.free_links;
-    free = std::to_string(percent) + " % of " + std::to_string(s.free_links);
-  }
-  std::printf(
-      "| %s | %s | %zu | %g | %g | %s | %g %% | %.0f | %s | %zu of %zu | %.2f / %.2f | "
-      "%.1f / %.1f | %zu |\n",
-      scene.name.c_str(), scene.link.c_str(), setting.points, 1e3 * setting.noise,
-      1e3 * setting.tolerance, asked, 1e2 * s.share, quantile(s.full_us, 0.5), free.c_str(),
-      s.unknown, s.links, width, width_p90, late, latest, s.wrong);
-  std::fflush(stdout);
-  if (csv == nullptr) return;
-  std::fprintf(csv,
-               "\"%s\",\"%s\",%zu,%g,%g,%g,\"%s\",%g,%zu,%zu,%.2f,%zu,%zu,%zu,%zu,%.5f,%.5f,"
-               "%.5f,%.2f,%.2f,%.2f,%.2f,%zu\n",
-               scene.name.c_str(), scene.link.c_str(), setting.points, 1e3 * setting.noise,
-               1e3 * setting.tolerance, max_error_mm, asked, s.share, s.queries, s.stopped,
-               quantile(s.full_us, 0.5), s.links, s.unknown, s.free_links, s.proven_free, width,
-               width_p90, 1e3 * quantile(s.width, 0.99), quantile(s.overrun_us, 0.5),
-               quantile(s.overrun_us, 0.99), late, latest, s.wrong);
-  std::fflush(csv);
-}
-
-// Measures one scene with one setting. Returns whether every answer was right.
-bool run(const HardScene& scene, const std::shared_ptr<const ist::RobotModel>& model,
-         const Setting& setting, const Options& options, std::FILE* csv) {
-  bool all_right = true;
-  if (options.deadlines.empty()) {
-    const Measured measured = measure(scene, model, setting);
-    print_line(scene, setting, measured);
-    if (csv != nullptr) print(csv, scene, setting, options.max_error_mm, measured);
-    return measured.checked.wrong == 0;
-  }
-  for (const Stopped& stopped : measure_deadlines(scene, model, setting, options.deadlines)) {
-    print(csv, scene, setting, options.max_error_mm, stopped);
-    all_right = all_right && stopped.wrong == 0;
-  }
-  return all_right;
-}
-
-// The settings of a scene.
-std::vector<Setting> settings(const HardScene& scene, const Options& options) {
-  std::vector<Setting> all;
-  for (const std::size_t points : options.points) {
-    for (const double noise_mm : options.noise_mm) {
-      for (const double tolerance_mm : options.tolerance_mm) {
-        Setting setting = options.setting;
-        setting.tolerance = 1e-3 * tolerance_mm;
-        if (!scene.is_recorded) {
-          setting.points = points;
-          setting.noise = 1e-3 * noise_mm;
-        } else if (points != options.points.front() || noise_mm != options.noise_mm.front()) {
-          continue;
-        }
-        all.push_back(setting);
+// By tolerance: what is measured with the nearest link at `distance` [m], in all frames.
+std::array<Measured, kTolerances.size()> measure_near(
+    const MovingRobot& robot, const std::shared_ptr<const RobotModel>& model, double distance,
+    const std::vector<Scene>& frames, bool quick) {
+  constexpr std::size_t kLeastSteps = 8, kMostSteps = 36;  // shorter parts are left out
+  std::array<Measured, kTolerances.size()> all;
+  for (const Scene& scene : frames) {
+    CloudSnapshot cloud;
+    Ingest(test::whole_cloud(false)).run(scene.frame.raw(), scene.frame.X_FS, {}, 0.0, &cloud);
+    for (std::size_t part = 0; part < (quick ? 3 : 12); ++part) {
+      std::vector<Poses> motion = robot.part(part);
+      motion.resize(std::min(motion.size(), kMostSteps));
+      motion = kept_at(distance, motion, model, cloud);
+      if (motion.size() < kLeastSteps) continue;
+      const auto poses = [motion](double time) {
+        return motion[static_cast<std::size_t>(std::lround(1e3 * time))];
+      };
+      Setting setting;
+      setting.steps = motion.size() - 1;
+      setting.cold = setting.images = 1;
+      setting.checks = part == 0 ? 1 : 0;
+      for (std::size_t t = 0; t < all.size(); ++t) {
+        const HardScene one{scene.name, robot.name, robot.robot, images_after(scene.frame), poses};
+        setting.tolerance = kTolerances[t];
+        measure(one, model, setting, &all[t]);
       }
     }
   }
   return all;
 }
 
-// Returns whether every answer was right.
-bool run(const Options& options, std::FILE* csv) {
-  bool all_right = true;
-  (options.deadlines.empty() ? print_header : print_deadline_header)(csv);
-  for (const HardScene& scene : all_scenes(options.cache)) {
-    if (!is_wanted(scene.name, options.scenes) || !is_wanted(scene.link, options.links)) continue;
-    const auto model =
-        ist::benchmark::packed(scene.robot, options.cache, 1e-3 * options.max_error_mm);
-    for (const Setting& setting : settings(scene, options)) {
-      all_right = run(scene, model, setting, options, csv) && all_right;
+/// @returns the number of wrong answers
+std::size_t measure_near(const std::filesystem::path& data, const Options& options, CsvFile* csv) {
+  const std::vector<Scene> frames = kinect_data(data, options.cache).scenes;
+  std::size_t wrong = 0;
+  for (const MovingRobot& robot : moving_robots(data)) {
+    const auto model = packed(robot.robot, options.cache, kMaxError);
+    for (const double distance : kDistances) {
+      std::fprintf(stderr, "%s, nearest link at %g mm\n", robot.name.c_str(), 1e3 * distance);
+      const auto measured = measure_near(robot, model, distance, frames, options.quick);
+      for (std::size_t t = 0; t < measured.size(); ++t) {
+        wrong += measured[t].checked.wrong;
+        for (std::size_t asked = 0; asked < kAsked; ++asked) {
+          if (measured[t].times[asked].us.empty()) continue;
+          csv->add("robot", robot.name)
+              .add("tolerance_mm", 1e3 * kTolerances[t])
+              .add("max_error_mm", 1e3 * kMaxError)
+              .add("distance_mm", 1e3 * distance);
+          add_times(measured[t].times[asked], asked, csv)
+              .add("checked", measured[t].checked.answers)
+              .add("wrong", measured[t].checked.wrong)
+              .end_row();
+        }
+      }
     }
   }
-  return all_right;
+  return wrong;
+}
+
+std::size_t run(const Options& options) {
+  CsvFile hard(options.folder + "/hard.csv"), near(options.folder + "/near.csv"),
+      deadline(options.folder + "/deadline.csv");
+  std::vector<HardScene> scenes = hard_scenes();
+  const auto data = test::data_dir();
+  if (data) {
+    for (const HardScene& scene : recorded_scenes(*data, options.cache)) scenes.push_back(scene);
+  } else {
+    std::fprintf(stderr, "%s\n", test::kNoData.c_str());
+  }
+  std::size_t wrong = 0;
+  for (const HardScene& scene : scenes) {
+    if (scene.name.find(options.only) == std::string::npos) continue;
+    wrong += measure_scene(scene, options, &hard, &deadline);
+  }
+  if (data && options.only.empty()) wrong += measure_near(*data, options, &near);
+  return wrong;
 }
 
 }  // namespace
+}  // namespace ist::benchmark
 
 int main(int argc, char** argv) {
-  Options options;
-  CLI::App app("Queries in hard scenes: ties, near-ties, contact, enclosure.");
-  app.option_defaults()->always_capture_default();
-  app.add_option("--scene", options.scenes, "Scenes whose names contain one of these words")
-      ->delimiter(',');
-  app.add_option("--link", options.links, "The same for links: sphere, box, cylinder, mesh, arm")
-      ->delimiter(',');
-  app.add_option("--points", options.points, "Points of the clouds")->delimiter(',');
-  app.add_option("--noise", options.noise_mm, "Standard deviation of the points [mm]")
-      ->delimiter(',');
-  app.add_option("--tolerance", options.tolerance_mm, "Of the queries [mm]")->delimiter(',');
-  app.add_option("--max-error", options.max_error_mm, "Of the packing [mm]");
-  app.add_option("--steps", options.setting.steps, "Queries on the motion, 1 ms apart")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--cold", options.setting.cold, "Cold queries")->check(CLI::PositiveNumber);
-  app.add_option("--images", options.setting.images, "First queries after an image");
-  app.add_option("--check", options.setting.checks, "Configurations checked by brute force");
-  app.add_option("--budget", options.setting.budget,
-                 "Time for the queries of one kind in one scene [s]");
-  app.add_option("--deadline", options.deadlines,
-                 "Shares of the full query's time after which queries are stopped, e.g. 0.1,0.5")
-      ->delimiter(',')
-      ->check(CLI::PositiveNumber);
-  app.add_option("--csv", options.csv, "File for all numbers");
-  app.add_option("--cache", options.cache, "Folder that keeps packings");
-  app.add_flag("--list", options.list, "List the scenes and end");
-  CLI11_PARSE(app, argc, argv);
-  if (options.list) {
-    for (const HardScene& scene : all_scenes(options.cache)) {
-      std::printf("%s: %s\n", scene.name.c_str(), scene.link.c_str());
-    }
-    return 0;
-  }
-  std::FILE* csv = nullptr;
-  if (!options.csv.empty() && (csv = std::fopen(options.csv.c_str(), "w")) == nullptr) {
-    std::perror(options.csv.c_str());
-    return 2;
-  }
-  const bool all_right = run(options, csv);
-  if (csv != nullptr) std::fclose(csv);
-  return all_right ? 0 : 1;
+  ist::benchmark::Options options;
+  ist::benchmark::CommandLine line("Queries in hard scenes, near and touching, and out of time.");
+  line.add_option("folder", options.folder, "Where CSV files are written")->required();
+  line.add_option("cache", options.cache, "Folder that keeps packings")->required();
+  line.add_flag("--quick", options.quick, "Fewer clouds and queries");
+  line.add_option("--only", options.only, "A scene whose name contains this");
+  line.read(argc, argv);
+  return ist::benchmark::run(options) == 0 ? 0 : 1;
 }

@@ -2,21 +2,18 @@
 // the same clouds in the same run (octomap_server's: insertPointCloud with a largest range, a ray
 // for each point), and the query with and without what is remembered. The simulated arm moves among
 // obstacles in front of a depth camera.
-//
-// Usage: memory [seconds of simulation] [document]
 
-#include <algorithm>
-#include <array>
+#include <octomap/octomap.h>
+
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
-#include "document.h"
 #include "internal/cloud/memory_scan.h"
 #include "ist_proximity/cloud/memory_map.h"
+#include "ist_proximity/octomap.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "scene.h"
@@ -24,23 +21,16 @@
 #include "support.h"
 #include "support/demo_arm.h"
 
-#ifdef IST_PROXIMITY_HAS_OCTOMAP
-#include <octomap/octomap.h>
-
-#include <memory>
-#include <sstream>
-
-#include "ist_proximity/octomap.h"
-#endif
-
 namespace {
 
 using ist::benchmark::quantile;
+using ist::benchmark::text_of;
 using ist::benchmark::ThreadTimer;
 
-constexpr double kResolution = 0.02;  // [m]
-constexpr double kMaxRange = 3.0;     // [m]
-constexpr int kPeerEvery = 10;        // liboctomap takes one cloud of so many
+constexpr double kResolution = 0.02;    // [m]
+constexpr double kMaxRange = 3.0;       // [m]
+constexpr std::size_t kPeerEvery = 10;  // liboctomap takes one cloud of so many
+using Poses = std::vector<Eigen::Isometry3d>;
 
 struct Times {
   std::vector<double> ingest, scan, insert, boxes;  // [us] of a cloud
@@ -49,14 +39,6 @@ struct Times {
   std::vector<double> query, query_with;            // [us]
 };
 
-ist::MemoryConfig memory_config() {
-  ist::MemoryConfig config;
-  config.resolution = kResolution;
-  config.max_range = kMaxRange;
-  return config;
-}
-
-#ifdef IST_PROXIMITY_HAS_OCTOMAP
 // Inserts the obstacles of a cloud, and the points beyond the largest range, which clear only. Rays
 // that end on the robot are left out: octomap_server has no such thing.
 double insert_octomap(const ist::MemoryScan& scan, bool discretize, octomap::OcTree* tree) {
@@ -76,7 +58,7 @@ double insert_octomap(const ist::MemoryScan& scan, bool discretize, octomap::OcT
 }
 
 // Writes the map as octomap's message by way of a tree: what it holds has to get there first.
-double write_octomap(const ist::MemoryMap& map, const octomap::OcTree& known, std::size_t* size) {
+double write_octomap(const ist::MemoryMap& map, const octomap::OcTree& known) {
   std::stringstream stream;
   ThreadTimer timer;
   octomap::OcTree tree(kResolution);
@@ -88,9 +70,7 @@ double write_octomap(const ist::MemoryMap& map, const octomap::OcTree& known, st
   tree.toMaxLikelihood();
   tree.prune();
   tree.writeBinaryData(stream);
-  const double us = timer.lap();
-  *size = stream.str().size();
-  return us;
+  return timer.lap();
 }
 
 // The voxels that the map knows, each a leaf.
@@ -99,17 +79,10 @@ std::unique_ptr<octomap::OcTree> known_voxels(const ist::MemoryMap& map) {
   tree->expand();
   return tree;
 }
-#endif
-
-std::string line(const char* format, double a, double b) {
-  std::array<char, 200> text{};
-  std::snprintf(text.data(), text.size(), format, a, b);
-  return text.data();
-}
 
 std::string row(const char* name, const std::vector<double>& us) {
-  return std::string("| ") + name +
-         line(" | %.2f ms | %.2f ms |\n", 1e-3 * quantile(us, 0.5), 1e-3 * quantile(us, 0.99));
+  return text_of("| %s | %.2f ms | %.2f ms |\n", name, 1e-3 * quantile(us, 0.5),
+                 1e-3 * quantile(us, 0.99));
 }
 
 std::string table(const Times& t) {
@@ -126,14 +99,13 @@ std::string table(const Times& t) {
   text += row("query of all links, with memory", t.query_with);
   const double ours = quantile(t.scan, 0.5) + quantile(t.insert, 0.5) + quantile(t.boxes, 0.5);
   const double peer = quantile(t.octomap, 0.5), discrete = quantile(t.octomap_discrete, 0.5);
-  text += line("\nClouds a second on one core: %.1f. liboctomap: %.2f as octomap_server inserts, ",
-               1e6 / ours, 1e6 / peer);
-  text += line("%.2f discretized;\nit takes %.1f ", 1e6 / discrete, peer / ours);
-  text += line(
-      "and %.1f times as long. With memory the query's 99th percentile is %.2f times that\n"
-      "without.\n",
-      discrete / ours, quantile(t.query_with, 0.99) / quantile(t.query, 0.99));
-  return text;
+  return text +
+         text_of(
+             "\nClouds a second on one core: %.1f. liboctomap: %.2f as octomap_server inserts, "
+             "%.2f discretized;\nit takes %.1f and %.1f times as long. With memory the query's "
+             "99th percentile is %.2f times that\nwithout.\n",
+             1e6 / ours, 1e6 / peer, 1e6 / discrete, peer / ours, discrete / ours,
+             quantile(t.query_with, 0.99) / quantile(t.query, 0.99));
 }
 
 // A room about the demonstration, so that every pixel has a depth.
@@ -150,94 +122,121 @@ std::vector<ist::sim::Obstacle> walls() {
   return all;
 }
 
+// The demonstration, with walls and one camera of 640 x 480 pixels.
+ist::sim::Simulation make_world(const ist::RobotDescription& robot) {
+  ist::sim::DepthCameraConfig camera = ist::sim::demo_cameras().front();
+  camera.width = 640;
+  camera.height = 480;
+  camera.focal_length *= 4.0;
+  camera.max_depth = 4.5;
+  std::vector<ist::sim::Obstacle> obstacles = walls();
+  for (const ist::sim::Obstacle& one : ist::sim::demo_obstacles()) obstacles.push_back(one);
+  ist::sim::Simulation world(robot, ist::sim::demo_arm(), obstacles, {camera}, 1);
+  world.arm().reset(
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(world.arm().config().joints.size())));
+  return world;
+}
+
+// Clouds and queries, without and with memory, and liboctomap beside it.
+class Trial {
+ public:
+  Trial(std::shared_ptr<const ist::RobotModel> model, const Eigen::Isometry3d& X_FS)
+      : model_(std::move(model)),
+        X_FS_(X_FS),
+        ingest_(ingest_config()),
+        map_(memory_config()),
+        query_(model_, {}),
+        query_with_(model_, {}) {}
+
+  void take(ist::sim::Picture picture, const Poses& X_FL) {
+    picture_ = std::move(picture);
+    const auto solids = posed_solids(*model_, X_FL, std::vector<bool>(X_FL.size(), true));
+    ThreadTimer timer;
+    ingest_.run(picture_.raw(), X_FS_, solids, picture_.stamp, &cloud_);
+    times_.ingest.push_back(timer.lap());
+    read_memory_scan(picture_.raw(), cloud_, X_FS_, ingest_config().min_range, kMaxRange, &scan_);
+    times_.scan.push_back(timer.lap());
+    map_.insert(scan_);
+    times_.insert.push_back(timer.lap());
+    map_.hidden_boxes(&boxes_);
+    auto index = std::make_shared<ist::BoxIndex>();
+    index->build(boxes_);
+    memory_.boxes = index;
+    times_.boxes.push_back(timer.lap());
+    if (times_.ingest.size() % kPeerEvery == 1) take_with_peer();
+  }
+
+  void query(const Poses& X_FL) {
+    if (times_.ingest.empty()) return;
+    const std::vector<bool> known(X_FL.size(), true);
+    ThreadTimer timer;
+    query_.run(X_FL, known, {&cloud_}, &results_);
+    times_.query.push_back(timer.lap());
+    query_with_.run(X_FL, known, {&cloud_, &memory_}, &results_);
+    times_.query_with.push_back(timer.lap());
+  }
+
+  const Times& times() const { return times_; }
+
+ private:
+  static ist::IngestConfig ingest_config() {
+    ist::IngestConfig config;
+    config.max_range = kMaxRange;
+    config.self_filter_padding = 0.03;
+    return config;
+  }
+  static ist::MemoryConfig memory_config() {
+    ist::MemoryConfig config;
+    config.resolution = kResolution;
+    config.max_range = kMaxRange;
+    return config;
+  }
+
+  void take_with_peer() {
+    times_.octomap.push_back(insert_octomap(scan_, false, &tree_));
+    times_.octomap_discrete.push_back(insert_octomap(scan_, true, &discrete_tree_));
+    const auto voxels = known_voxels(map_);
+    ThreadTimer timer;
+    map_.octree_bytes();
+    times_.message.push_back(timer.lap());
+    times_.octomap_message.push_back(write_octomap(map_, *voxels));
+  }
+
+  std::shared_ptr<const ist::RobotModel> model_;
+  Eigen::Isometry3d X_FS_;
+  ist::Ingest ingest_;
+  ist::MemoryMap map_;
+  octomap::OcTree tree_{kResolution}, discrete_tree_{kResolution};
+  ist::sim::Picture picture_;
+  ist::CloudSnapshot cloud_, memory_;
+  ist::MemoryScan scan_;
+  ist::VoxelBoxes boxes_;
+  ist::ProximityQuery query_, query_with_;
+  std::vector<ist::LinkProximity> results_;
+  Times times_;
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  const double seconds = argc > 1 ? std::atof(argv[1]) : 4.0;
+  double seconds = 4.0;
+  ist::benchmark::CommandLine line("What remembering costs, beside liboctomap.");
+  line.add_option("--seconds", seconds, "Of simulation");
+  line.read(argc, argv);
   const ist::RobotDescription robot = ist::test::demo_robot();
-  const auto model = ist::build_robot_model(robot, {});
-  std::vector<ist::sim::DepthCameraConfig> cameras = ist::sim::demo_cameras();
-  cameras.resize(1);
-  cameras[0].width = 640;
-  cameras[0].height = 480;
-  cameras[0].focal_length *= 4.0;
-  cameras[0].max_depth = 4.5;
-  std::vector<ist::sim::Obstacle> obstacles = walls();
-  for (const ist::sim::Obstacle& one : ist::sim::demo_obstacles()) obstacles.push_back(one);
-  ist::sim::Simulation world(robot, ist::sim::demo_arm(), obstacles, cameras, 1);
-  Eigen::VectorXd q =
-      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(world.arm().config().joints.size()));
-  world.arm().reset(q);
-
-  ist::IngestConfig ingest_config;
-  ingest_config.max_range = kMaxRange;
-  ingest_config.self_filter_padding = 0.03;
-  ist::Ingest ingest(ingest_config);
-  ist::MemoryMap map(memory_config());
-#ifdef IST_PROXIMITY_HAS_OCTOMAP
-  octomap::OcTree tree(kResolution), discrete_tree(kResolution);
-#endif
-  std::size_t message_size = 0, octomap_message_size = 0;  // [bytes]
-  ist::CloudSnapshot cloud, memory;
-  ist::MemoryScan scan;
-  ist::VoxelBoxes boxes;
-  ist::ProximityQuery query(model, {}), query_with(model, {});
-  std::vector<ist::LinkProximity> results;
-  ist::sim::Picture picture;
-  Times times;
-  int frames = 0;
+  ist::sim::Simulation world = make_world(robot);
+  Trial trial(ist::build_robot_model(robot, {}), world.cameras()[0].config().X_FC);
+  Eigen::VectorXd command = 0.0 * world.arm().positions();
   for (int step = 0; world.time() < seconds; ++step) {
     for (ist::sim::Picture& newest : world.take_pictures()) {
-      picture = std::move(newest);
-      const auto X_FL = world.link_poses(picture.stamp);
-      const auto solids = posed_solids(*model, X_FL, std::vector<bool>(X_FL.size(), true));
-      const Eigen::Isometry3d& X_FS = world.cameras()[0].config().X_FC;
-      ThreadTimer timer;
-      ingest.run(picture.raw(), X_FS, solids, picture.stamp, &cloud);
-      times.ingest.push_back(timer.lap());
-      read_memory_scan(picture.raw(), cloud, X_FS, ingest_config.min_range, kMaxRange, &scan);
-      times.scan.push_back(timer.lap());
-      map.insert(scan);
-      times.insert.push_back(timer.lap());
-      map.hidden_boxes(&boxes);
-      auto index = std::make_shared<ist::BoxIndex>();
-      index->build(boxes);
-      memory.boxes = index;
-      times.boxes.push_back(timer.lap());
-      if (frames++ % kPeerEvery != 0) continue;
-#ifdef IST_PROXIMITY_HAS_OCTOMAP
-      times.octomap.push_back(insert_octomap(scan, false, &tree));
-      times.octomap_discrete.push_back(insert_octomap(scan, true, &discrete_tree));
-      const auto voxels = known_voxels(map);
-      timer.lap();
-      message_size = map.octree_bytes().size();
-      times.message.push_back(timer.lap());
-      times.octomap_message.push_back(write_octomap(map, *voxels, &octomap_message_size));
-#endif
+      const Poses X_FL = world.link_poses(newest.stamp);
+      trial.take(std::move(newest), X_FL);
     }
-    if (frames > 0 && step % 2 == 0) {
-      const auto X_FL = world.link_poses();
-      const std::vector<bool> known(X_FL.size(), true);
-      ThreadTimer timer;
-      query.run(X_FL, known, {&cloud}, &results);
-      times.query.push_back(timer.lap());
-      query_with.run(X_FL, known, {&cloud, &memory}, &results);
-      times.query_with.push_back(timer.lap());
-    }
-    Eigen::VectorXd command(q.size());
-    for (Eigen::Index i = 0; i < q.size(); ++i) {
+    if (step % 2 == 0) trial.query(world.link_poses());
+    for (Eigen::Index i = 0; i < command.size(); ++i) {
       command[i] = 0.6 * std::sin(world.time() * (0.9 + 0.3 * static_cast<double>(i)));
     }
     world.step(command);
   }
-  const std::string text = table(times);
-  std::printf("%s", text.c_str());
-  const ist::MemoryCounts counts = map.counts();
-  std::printf("last cloud: %zu obstacle points, %zu other rays; ", scan.hits.size(),
-              scan.free_ends.size());
-  std::printf("%zu voxels known, %zu occupied, %zu in memory, %zu boxes hidden\n", counts.known,
-              counts.occupied, counts.nodes, boxes.size());
-  std::printf("message: %zu bytes, liboctomap's: %zu\n", message_size, octomap_message_size);
-  if (argc <= 2) return 0;
-  return ist::benchmark::write_table(argv[2], "memory cost", text) ? 0 : 1;
+  return line.publish("memory cost", table(trial.times()));
 }

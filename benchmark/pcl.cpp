@@ -2,8 +2,6 @@
 // RadiusOutlierRemoval at the same radius and number of neighbors on recorded clouds, with the
 // points that only one of them drops; the reading of their files; and what both readers say of
 // files that are cut off.
-//
-// Usage: pcl FOLDER_OF_CLOUDS [DOCUMENT]        (prints, or writes its table)
 #include <pcl/console/print.h>
 #include <pcl/filters/radius_outlier_removal.h>
 #include <pcl/io/pcd_io.h>
@@ -18,7 +16,6 @@
 #include <string>
 #include <vector>
 
-#include "document.h"
 #include "internal/cloud/noise_filter.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/pcl.h"
@@ -29,6 +26,7 @@ namespace {
 
 using Cloud = pcl::PointCloud<pcl::PointXYZ>;
 using ist::benchmark::quantile;
+using ist::benchmark::text_of;
 using ist::benchmark::ThreadTimer;
 
 constexpr int kNeighbors = 4;  // the node's default
@@ -144,23 +142,25 @@ void cut_off(Verdicts* ours, Verdicts* peers) {
   }
 }
 
-template <class... Values>
-std::string line(const char* format, Values... values) {
-  std::array<char, 300> text{};
-  std::snprintf(text.data(), text.size(), format, values...);
-  return text.data();
+// Of a reader: the row of the table.
+std::string reader_row(const char* name, const std::vector<double>& us, const Verdicts& verdicts) {
+  return text_of("| %s | %.1f ms | %zu of %zu | %zu |\n", name, 1e-3 * quantile(us, 0.5),
+                 verdicts.taken, verdicts.files, verdicts.crashed);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 2) return 2;
+  ist::benchmark::CommandLine line("The noise filter and the reading of files, beside PCL.");
+  line.read(argc, argv);
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);
   std::array<Noise, 3> noises;
-  const std::array<double, 3> radii = {0.005, 0.01, 0.02};
-  for (std::size_t i = 0; i < radii.size(); ++i) noises[i].radius = radii[i];
+  noises[0].radius = 0.005;
+  noises[1].radius = 0.01;
+  noises[2].radius = 0.02;
   std::vector<double> ours, peers;  // [us]
-  for (const auto& entry : std::filesystem::directory_iterator(argv[1])) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(ist::benchmark::data_or_exit() / "clouds")) {
     if (entry.path().extension() != ".pcd") continue;
     const auto cloud = std::make_shared<Cloud>();
     for (int i = 0; i < kRepetitions; ++i) {
@@ -174,23 +174,17 @@ int main(int argc, char** argv) {
   }
   Verdicts our_verdicts, peer_verdicts;
   cut_off(&our_verdicts, &peer_verdicts);
-  const auto ms = [](const std::vector<double>& us) { return 1e-3 * quantile(us, 0.5); };
   std::string text =
       "| noise filter, radius | this package | `RadiusOutlierRemoval` | | dropped | by one of the "
-      "two |\n"
-      "|---|---|---|---|---|---|\n";
+      "two |\n|---|---|---|---|---|---|\n";
   for (const Noise& one : noises) {
-    text += line("| %.0f mm | %.1f ms | %.1f ms | %.1f times | %zu of %zu | %zu |\n",
-                 1e3 * one.radius, ms(one.ours), ms(one.peers), ms(one.peers) / ms(one.ours),
-                 one.dropped, one.points, one.different);
+    const double our_ms = 1e-3 * quantile(one.ours, 0.5), ms = 1e-3 * quantile(one.peers, 0.5);
+    text +=
+        text_of("| %.0f mm | %.1f ms | %.1f ms | %.1f times | %zu of %zu | %zu |\n",
+                1e3 * one.radius, our_ms, ms, ms / our_ms, one.dropped, one.points, one.different);
   }
   text +=
-      "\n| | a PCD file | files cut off that are taken for whole | crashes |\n|---|---|---|---|\n";
-  text += line("| this package | %.1f ms | %zu of %zu | %zu |\n", ms(ours), our_verdicts.taken,
-               our_verdicts.files, our_verdicts.crashed);
-  text += line("| PCL | %.1f ms | %zu of %zu | %zu |\n", ms(peers), peer_verdicts.taken,
-               peer_verdicts.files, peer_verdicts.crashed);
-  std::printf("%s", text.c_str());
-  if (argc <= 2) return 0;
-  return ist::benchmark::write_table(argv[2], "beside pcl", text) ? 0 : 1;
+      "\n| | a PCD file | files cut off that are taken for whole | crashes |\n|---|---|---|---|\n" +
+      reader_row("this package", ours, our_verdicts) + reader_row("PCL", peers, peer_verdicts);
+  return line.publish("beside pcl", text);
 }

@@ -26,6 +26,14 @@ struct Arm {
   std::shared_ptr<const RobotModel> model = test::demo_model();
   std::shared_ptr<const Kinematics> kinematics = std::make_shared<Kinematics>(description);
   std::vector<bool> moves = links_that_move(*model, *kinematics, kinematics->bodies().front());
+
+  std::size_t random_link(Random* random) const {
+    std::vector<std::size_t> links;
+    for (std::size_t i = 0; i < moves.size(); ++i) {
+      if (moves[i] && model->links[i].usable()) links.push_back(i);
+    }
+    return links[(*random)() % links.size()];
+  }
 };
 
 /// Six positions, between which joints move along cubic polynomials.

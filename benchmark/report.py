@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Makes the tables and plots of the numbers that scripts/benchmark measured. Needs Python only.
 
-Writes CSV files (with commit and machine) and plots to FOLDER, and the tables of FOLDER/benchmark.md and
-of the README: the lines between the markers `<!-- NAME -->` and `<!-- end of NAME -->`.
+Writes CSV files (with commit and machine) and a plot to FOLDER, and the tables of FOLDER/benchmark.md:
+the lines between the markers `<!-- NAME -->` and `<!-- end of NAME -->`.
 """
 
 import argparse
@@ -12,8 +12,8 @@ import re
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-QUERIES_PER_FRAME = 33  # 1 kHz between two images at 30 Hz
-NAMES = {"kinect": "Kinect frames", "synthetic": "Synthetic scene"}
+RUNS = {"peers": "benchmark run", "hard": "benchmark hard run", "camera": "benchmark camera run",
+        "ros": "ros run"}
 
 
 def read(path):
@@ -60,15 +60,6 @@ def worst(row):
     return max(-row["error_least_mm"], row["error_largest_mm"])
 
 
-FREE = "free_frame_us"  # where no link is in contact
-
-
-def frame(row, measured="frame_us"):
-    """[us] of work between two images."""
-    query = "free_query_us" if measured == FREE else "query_us"
-    return row[measured] or row["ingest_us"] + QUERIES_PER_FRAME * row[query]
-
-
 def table(header, rows):
     lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
@@ -83,14 +74,12 @@ def short_table(rows):
                   "motion at 1 kHz, median / p99", "one 30 Hz frame", "worst error"],
                  [[label(r), time(r["ingest_us"]), time(r["free_query_us"]), time(r["query_us"]),
                    f"{time(r['motion_us'])} / {time(r['motion_p99_us'])}" if r["motion_queries"] else "",
-                   time(frame(r)), "0" if worst(r) < 0.01 else f"{worst(r):.2g} mm"] for r in keep])
+                   time(r["frame_us"]), "0" if worst(r) < 0.01 else f"{worst(r):.2g} mm"] for r in keep])
 
 
 def hard_table(rows):
-    """Warm median / 99th percentile and the first query after an image, with most points. Primitives are in the CSV."""
-    most = max(r["points"] for r in rows)
-    cell = {(r["scene"], r["link"], r["noise_mm"], r["tolerance_mm"], r["asked"]): r for r in rows
-            if r["points"] in (0, most)}
+    """Warm median / 99th percentile and the first query after an image."""
+    cell = {(r["scene"], r["link"], r["noise_mm"], r["tolerance_mm"], r["asked"]): r for r in rows}
 
     def warm(*key):
         r = cell.get((*key, "warm"))
@@ -99,15 +88,10 @@ def hard_table(rows):
     def new(*key):
         r = cell.get((*key, "new image"))
         return time(r["median_us"]) if r else ""
+    sources = dict.fromkeys((r["scene"], r["link"]) for r in rows)
     return table(["scene", "link", "to 1 mm", "with noise of 1 mm", "new image", "exact, no noise"],
                  [[*source, warm(*source, 0, 1), warm(*source, 1, 1),
-                   new(*source, 1, 1) or new(*source, 0, 1), warm(*source, 0, 0)]
-                  for source in sources(rows) if " " in source[1] or source[1] == "bellows"])
-
-
-def sources(rows):
-    """The scenes with their links, in the order of the file."""
-    return list(dict.fromkeys((r["scene"], r["link"]) for r in rows))
+                   new(*source, 1, 1) or new(*source, 0, 1), warm(*source, 0, 0)] for source in sources])
 
 
 def checks(rows, keys):
@@ -142,95 +126,86 @@ def deadline_table(rows):
 class Plot:
     """Speed against error, both axes logarithmic, as SVG."""
 
-    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 520, 80, 30, 40, 60
+    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 520, 80, 830, 40, 460
     COLOURS = {"ours": "#c0392b", "exact": "#2c3e50", "spheres": "#2980b9", "grid": "#8e44ad"}
     FLOOR_MM = 0.01  # exact to float: drawn here
 
     def __init__(self, rows, title):
-        self.rows, self.title, self.parts = rows, title, []
-        times = [r["free_query_us"] for r in self.rows]
-        self.y = (math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
-        self.x = (math.log10(self.FLOOR_MM) - 0.3, 3.0)  # room for labels
+        self.parts = []
+        times = [math.log10(r["free_query_us"]) for r in rows]
+        self.decades = (math.floor(min(times)), math.ceil(max(times)))
+        self.axes(title)
+        self.front([r for r in rows if r["kind"] == "ours"])
+        self.peers(sorted((r for r in rows if r["kind"] != "ours"), key=lambda r: r["free_query_us"]))
 
-    def py(self, us):
-        share = (math.log10(us) - self.y[0]) / (self.y[1] - self.y[0])
-        return self.HEIGHT - self.BOTTOM - share * (self.HEIGHT - self.TOP - self.BOTTOM)
+    def x(self, mm):
+        low, high = math.log10(self.FLOOR_MM) - 0.3, 3.0  # room for labels
+        share = (math.log10(max(mm, self.FLOOR_MM)) - low) / (high - low)
+        return self.LEFT + share * (self.RIGHT - self.LEFT)
+
+    def y(self, us):
+        low, high = self.decades
+        return self.BOTTOM - (math.log10(us) - low) / (high - low) * (self.BOTTOM - self.TOP)
+
+    def place(self, row):
+        return self.x(worst(row)), self.y(row["free_query_us"])
 
     def text(self, x, y, words, anchor="middle", colour="#333", extra=""):
         self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"'
                           f'{extra}>{escape(words)}</text>')
 
-    def whole(self):
-        return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.WIDTH} {self.HEIGHT}" '
-                'font-family="sans-serif" font-size="12">\n'
-                '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(self.parts) +
-                "\n</svg>\n")
+    def path(self, points, colour, width=1):
+        steps = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+        self.parts.append(f'<polyline points="{steps}" fill="none" stroke="{colour}" '
+                          f'stroke-width="{width}"/>')
 
-    def px(self, mm):
-        share = (math.log10(max(mm, self.FLOOR_MM)) - self.x[0]) / (self.x[1] - self.x[0])
-        return self.LEFT + share * (self.WIDTH - self.LEFT - self.RIGHT)
+    def dot(self, row, radius):
+        x, y = self.place(row)
+        self.parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" '
+                          f'fill="{self.COLOURS[row["kind"]]}"/>')
 
-    def line(self, x1, y1, x2, y2, colour):
-        self.parts.append(f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" '
-                          f'stroke="{colour}"/>')
+    def axes(self, title):
+        for decade in range(self.decades[0], self.decades[1] + 1):
+            y = self.y(10.0 ** decade)
+            self.path([(self.LEFT, y), (self.RIGHT, y)], "#ddd")
+            self.text(self.LEFT - 8, y + 4, time(10.0 ** decade).replace(".0", ""), "end")
+        for mm, words in ((0.01, "exact"), (0.1, "0.1 mm"), (1, "1 mm"), (10, "10 mm"), (100, "100 mm"),
+                          (1000, "1 m")):
+            self.path([(self.x(mm), self.TOP), (self.x(mm), self.BOTTOM)], "#ddd")
+            self.text(self.x(mm), self.BOTTOM + 18, words)
+        middle = (self.LEFT + self.RIGHT) / 2
+        self.text(middle, self.HEIGHT - 14, "largest error of a link's distance")
+        self.text(20, 250, "query of all links, out of contact: median, one thread",
+                  extra=' transform="rotate(-90 20 250)"')
+        self.text(middle, 22, title, extra=' font-weight="bold"')
 
-    def axes(self):
-        left, right = self.LEFT, self.WIDTH - self.RIGHT
-        bottom = self.HEIGHT - self.BOTTOM
-        for decade in range(self.y[0], self.y[1] + 1):
-            y = self.py(10.0 ** decade)
-            self.line(left, y, right, y, "#ddd")
-            self.text(left - 8, y + 4, time(10.0 ** decade).replace(".0", ""), "end")
-        for decade in range(-2, 4):
-            x = self.px(10.0 ** decade)
-            self.line(x, self.TOP, x, bottom, "#ddd")
-            self.text(x, bottom + 18,
-                      "exact" if decade == -2 else "1 m" if decade == 3 else f"{10.0 ** decade:g} mm")
-        self.text((left + right) / 2, self.HEIGHT - 14, "largest error of a link's distance")
-        self.text(20, (self.TOP + bottom) / 2, "query of all links, out of contact: median, one thread",
-                  extra=f' transform="rotate(-90 20 {(self.TOP + bottom) / 2:.0f})"')
-        self.text((left + right) / 2, 22, self.title, extra=' font-weight="bold"')
-
-    def front(self):
-        ours = [r for r in self.rows if r["kind"] == "ours"]
-        colour = self.COLOURS["ours"]
-        for r in ours:
-            self.dot(r, colour, 3)
-        steps, fastest = [], {}
-        for r in ours:  # the fastest for each tolerance
-            t = r["tolerance_mm"]
-            if t not in fastest or r["free_query_us"] < fastest[t]["free_query_us"]:
-                fastest[t] = r
-        for _, r in sorted(fastest.items()):
-            steps.append(f"{self.px(worst(r)):.1f},{self.py(r['free_query_us']):.1f}")
-        self.parts.append(f'<polyline points="{" ".join(steps)}" fill="none" stroke="{colour}" '
-                          'stroke-width="2"/>')
-        first = fastest[min(fastest)]
-        self.text(self.px(worst(first)) + 10, self.py(first["free_query_us"]) + 44,
+    def front(self, ours):
+        fastest = {}  # for each tolerance
+        for r in sorted(ours, key=lambda r: (r["tolerance_mm"], r["free_query_us"])):
+            self.dot(r, 3)
+            fastest.setdefault(r["tolerance_mm"], r)
+        places = [self.place(r) for r in fastest.values()]
+        self.path(places, self.COLOURS["ours"], 2)
+        self.text(places[0][0] + 10, places[0][1] + 44,
                   "ist_proximity: tolerance 0, 1, 5, 20 mm; packed to 10, 5, 2 mm", "start",
-                  colour)
+                  self.COLOURS["ours"])
 
-    def dot(self, row, colour, radius):
-        self.parts.append(f'<circle cx="{self.px(worst(row)):.1f}" cy="{self.py(row["free_query_us"]):.1f}" '
-                          f'r="{radius}" fill="{colour}"/>')
-
-    def peers(self):
-        taken = []  # heights of labels, so that none lies on another
-        for r in sorted((r for r in self.rows if r["kind"] != "ours"), key=lambda r: r["free_query_us"]):
-            colour = self.COLOURS[r["kind"]]
-            x, y = self.px(worst(r)), self.py(r["free_query_us"])
-            self.dot(r, colour, 5)
+    def peers(self, rows):
+        taken = []  # places of labels, so that none lies on another
+        for r in rows:
+            x, y = self.place(r)
+            self.dot(r, 5)
             at = y + 4
             while any(abs(at - other) < 14 and abs(x - place) < 200 for place, other in taken):
                 at -= 14
             taken.append((x, at))
-            self.text(x + 9, at, label(r), "start", colour)
+            self.text(x + 9, at, label(r), "start", self.COLOURS[r["kind"]])
 
     def svg(self):
-        self.axes()
-        self.front()
-        self.peers()
-        return self.whole()
+        return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.WIDTH} {self.HEIGHT}" '
+                'font-family="sans-serif" font-size="12">\n'
+                '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(self.parts) +
+                "\n</svg>\n")
 
 
 def fill(path, parts):
@@ -243,58 +218,35 @@ def fill(path, parts):
     path.write_text(text, encoding="utf-8")
 
 
-def sections(path):
-    """Tables in Markdown, each after a line '# NAME'."""
-    parts = {}
-    for section in path.read_text(encoding="utf-8").split("# ")[1:]:
-        name, content = section.split("\n", 1)
-        parts[f"benchmark {name}"] = content.rstrip("\n") + "\n"
-    return parts
+def report_hard(arguments):
+    rows = {name: read(arguments.folder / f"{name}.csv") for name in ("hard", "near", "deadline")}
+    for name in filter(rows.get, rows):
+        write(arguments.folder / f"benchmark_{name}.csv", rows[name], arguments)
+    return {"benchmark hard": hard_table(rows["hard"]),
+            "benchmark hard checks": checks(rows["hard"] + rows["near"], (
+                "scene", "link", "noise_mm", "robot", "distance_mm", "tolerance_mm")),
+            "benchmark deadline": deadline_table(rows["deadline"])}
 
 
-def report_hard(arguments, run):
-    hard, near, deadline = (read(path) for path in arguments.results)
-    for name, rows in (("hard", hard), ("near", near), ("deadline", deadline)):
-        if rows:
-            write(arguments.folder / f"benchmark_{name}.csv", rows, arguments)
-    parts = {"benchmark hard run": run, "benchmark hard": hard_table(hard),
-             "benchmark hard checks": checks(hard + near, (
-                 "scene", "link", "points", "noise_mm", "robot", "distance_mm", "tolerance_mm")),
-             "benchmark deadline": deadline_table(deadline)}
-    fill(arguments.folder / "benchmark.md", parts)
-
-
-def report_peers(arguments, run):
-    peers = read(arguments.results[0])
+def report_peers(arguments):
+    peers = read(arguments.folder / "peers.csv")
     write(arguments.folder / "benchmark.csv", peers, arguments)
-    shown = [r for r in peers if r["data"] == "kinect"] or peers
-    parts = {"benchmark run": run, "benchmark short": short_table(shown)}
-    fill(arguments.folder / "benchmark.md", parts)
-    title = f"Speed against error: {NAMES[shown[0]['data']]}, {arguments.commit}"
-    (arguments.folder / "benchmark.svg").write_text(Plot(shown, title).svg(), encoding="utf-8")
+    plot = Plot(peers, f"Speed against error: Kinect frames, {arguments.commit}")
+    (arguments.folder / "benchmark.svg").write_text(plot.svg(), encoding="utf-8")
+    return {"benchmark short": short_table(peers)}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("kind", choices=("peers", "hard", "camera"))
-    parser.add_argument("results", type=Path, nargs="+",
-                        help="peers: one CSV; hard: three CSV; camera: tables. Tables are in "
-                             "Markdown, each after a line '# NAME'")
+    parser.add_argument("kind", choices=RUNS, help="peers and hard: the CSV files are in FOLDER")
     for name in ("commit", "machine", "date"):
         parser.add_argument("--" + name, required=True)
     parser.add_argument("--folder", type=Path, required=True)
-    parser.add_argument("--readme", type=Path)
     arguments = parser.parse_args()
-    run = f"Commit {arguments.commit}, {arguments.date}, {arguments.machine}.\n"
-    if arguments.kind == "peers":
-        report_peers(arguments, run)
-    elif arguments.kind == "hard":
-        report_hard(arguments, run)
-    else:
-        parts = {**sections(arguments.results[0]), "benchmark camera run": run}
-        fill(arguments.folder / "benchmark.md", parts)
-        if arguments.readme:
-            fill(arguments.readme, parts)
+    parts = {RUNS[arguments.kind]: f"Commit {arguments.commit}, {arguments.date}, {arguments.machine}.\n"}
+    if arguments.kind in ("peers", "hard"):
+        parts.update(report_peers(arguments) if arguments.kind == "peers" else report_hard(arguments))
+    fill(arguments.folder / "benchmark.md", parts)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
 // A self-filter on real depth images: the Panda is pasted into the Kinect frames of the test data,
 // with noise, and moves through them. Answers without the robot's pixels are the truth. As
 // Markdown.
-//
-// Usage: self_pasted CACHE_FOLDER [--images N] [--update-doc doc/sources.md]
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "document.h"
 #include "internal/geometry/ray_cast.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
@@ -29,10 +26,11 @@ using ist::LinkProximity;
 using ist::LinkState;
 using ist::benchmark::DataSet;
 using ist::benchmark::Frame;
+using ist::benchmark::Poses;
 using ist::benchmark::quantile;
 using ist::benchmark::Scene;
+using ist::benchmark::text_of;
 using ist::benchmark::ThreadTimer;
-using Poses = std::vector<Eigen::Isometry3d>;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -40,17 +38,13 @@ constexpr double kTold = 0.005;    // [m] an answer of no more than this tells a
 constexpr double kClear = 0.03;    // [m] a link that is farther from the scene is clear of it
 constexpr std::size_t kStep = 33;  // configurations at 1 kHz between two images
 
-double range_of(const Frame& frame, std::size_t pixel) {
-  return Eigen::Vector3f(frame.data.data() + 4 * pixel).norm();
-}
-
 // Directions of all pixels, from those that were measured: a pinhole camera's.
 std::vector<Eigen::Vector3d> rays_of(const Frame& frame) {
   // Least squares of x / z over columns, and of y / z over rows.
   Eigen::Matrix2d across = Eigen::Matrix2d::Zero(), down = across;
   Eigen::Vector2d x = Eigen::Vector2d::Zero(), y = x;
-  for (std::size_t i = 0; i < frame.width * frame.height; ++i) {
-    const Eigen::Vector3d p = Eigen::Vector3f(frame.data.data() + 4 * i).cast<double>();
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const Eigen::Vector3d p = frame.point(i).cast<double>();
     if (!p.allFinite()) continue;
     const Eigen::Vector2d c(static_cast<double>(i % frame.width), 1.0),
         r(static_cast<double>(i / frame.width), 1.0);
@@ -60,7 +54,7 @@ std::vector<Eigen::Vector3d> rays_of(const Frame& frame) {
     y += p.y() / p.z() * r;
   }
   const Eigen::Vector2d u = across.inverse() * x, v = down.inverse() * y;
-  std::vector<Eigen::Vector3d> rays(frame.width * frame.height);
+  std::vector<Eigen::Vector3d> rays(frame.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
     rays[i] = Eigen::Vector3d(u[0] * static_cast<double>(i % frame.width) + u[1],
                               v[0] * static_cast<double>(i / frame.width) + v[1], 1.0)
@@ -81,7 +75,7 @@ Pasted paste(const Frame& frame, const std::vector<Eigen::Vector3d>& rays,
   Pasted pasted{frame, frame};
   std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const double measured = range_of(frame, i);
+    const double measured = frame.point(i).norm();
     double nearest = std::isnan(measured) ? kInf : measured;
     bool is_robot = false;
     for (std::size_t k = 0; k < model.links.size(); ++k) {
@@ -146,12 +140,10 @@ void count(const std::vector<LinkProximity>& truth, Trial* trial) {
 }
 
 std::string row(const std::string& name, const char* mode, const Trial& trial, double padding_us) {
-  char text[256];
   const double us = quantile(trial.us, 0.5);
-  std::snprintf(text, sizeof text, "| %s | `%s` | %d of %d | %d of %d | %.2f / %.2f ms | %.2f |\n",
-                name.c_str(), mode, trial.told, trial.touching, trial.false_touches, trial.clear,
-                1e-3 * us, 1e-3 * quantile(trial.us, 0.99), us / padding_us);
-  return text;
+  return text_of("| %s | `%s` | %d of %d | %d of %d | %.2f / %.2f ms | %.2f |\n", name.c_str(),
+                 mode, trial.told, trial.touching, trial.false_touches, trial.clear, 1e-3 * us,
+                 1e-3 * quantile(trial.us, 0.99), us / padding_us);
 }
 
 std::string rows(const Scene& scene, const std::shared_ptr<const ist::RobotModel>& model,
@@ -181,22 +173,17 @@ std::string rows(const Scene& scene, const std::shared_ptr<const ist::RobotModel
 }  // namespace
 
 int main(int argc, char** argv) {
-  ist::benchmark::Arguments arguments(argc, argv);
-  const std::size_t images = arguments.count("images", 180);
-  const std::string document = arguments.text("update-doc");
-  if (arguments.rest().size() != 1) {
-    std::fprintf(stderr, "Usage: self_pasted CACHE_FOLDER [--images N] [--update-doc FILE]\n");
-    return 2;
-  }
-  const DataSet set =
-      ist::benchmark::kinect_data(ist::benchmark::data_or_exit(), arguments.rest()[0]);
+  std::string cache;
+  std::size_t images = 180;
+  ist::benchmark::CommandLine line("A self-filter on recorded depth images.");
+  line.add_option("cache", cache, "Folder that keeps packings")->required();
+  line.add_option("--images", images, "Of each scene");
+  line.read(argc, argv);
+  const DataSet set = ist::benchmark::kinect_data(ist::benchmark::data_or_exit(), cache);
   const auto model = set.robot.pack(ist::PackingConfig().max_error);
   std::string table =
       "| frame | mode | links within 5 mm of the scene: told | links 3 cm from it and more: told | "
       "ingest, median / p99 | / `padding` |\n|---|---|---|---|---|---|\n";
   for (const Scene& scene : set.scenes) table += rows(scene, model, set.motion, images);
-  std::printf("%s", table.c_str());
-  const bool fails =
-      !document.empty() && !ist::benchmark::write_table(document, "self pasted", table);
-  return fails ? 1 : 0;
+  return line.publish("self pasted", table);
 }

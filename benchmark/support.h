@@ -2,19 +2,27 @@
 
 #include <time.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <future>
+#include <iomanip>
+#include <sstream>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "support/accuracy.h"
 #include "support/data_dir.h"
 
 namespace ist::benchmark {
@@ -26,52 +34,104 @@ inline std::filesystem::path data_or_exit() {
   std::exit(1);
 }
 
-/// The words of a command line.
-class Arguments {
+/// A text of values, as std::printf writes them.
+template <class... Values>
+std::string text_of(const char* format, const Values&... values) {
+  std::array<char, 1000> text{};
+  std::snprintf(text.data(), text.size(), format, values...);
+  return text.data();
+}
+
+/// A program's options, and the document that its tables are put into.
+class CommandLine : public CLI::App {
  public:
-  Arguments(int argc, char** argv) : words_(argv + 1, argv + argc) {}
-
-  /// Takes `--NAME VALUE` off the words. @returns the value; `otherwise` where it is not stated
-  std::string text(const std::string& name, std::string otherwise = "") {
-    const auto found = std::find(words_.begin(), words_.end(), "--" + name);
-    if (found == words_.end() || found + 1 == words_.end()) return otherwise;
-    otherwise = found[1];
-    words_.erase(found, found + 2);
-    return otherwise;
-  }
-  double number(const std::string& name, double otherwise) {
-    const std::string value = text(name);
-    return value.empty() ? otherwise : std::stod(value);
-  }
-  std::size_t count(const std::string& name, std::size_t otherwise) {
-    return static_cast<std::size_t>(number(name, static_cast<double>(otherwise)));
+  explicit CommandLine(const std::string& what) : CLI::App(what) {
+    option_defaults()->always_capture_default();
+    add_option("--update-doc", document_, "Document whose tables are written");
   }
 
-  /// What is left. Ends the program with a message where that holds an option.
-  const std::vector<std::string>& rest() const {
-    for (const std::string& word : words_) {
-      if (word.rfind("--", 0) != 0) continue;
-      std::fprintf(stderr, "unknown option, or one without its value: %s\n", word.c_str());
-      std::exit(2);
+  /// Ends the program where the words ask for help, or are wrong.
+  void read(int argc, char** argv) {
+    try {
+      parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      std::exit(exit(error));
     }
-    return words_;
+  }
+
+  /// Prints a table and puts it between its marks in the document.
+  /// @returns the program's exit code
+  int publish(const std::string& name, const std::string& table) const {
+    std::printf("%s", table.c_str());
+    std::fflush(stdout);
+    return document_.empty() ? 0 : write_table(document_, name, table);
+  }
+
+  /// @returns 1 with a message where the document cannot be written or lacks the marks, else 0
+  static int write_table(const std::string& document, const std::string& name,
+                         const std::string& table) {
+    std::string all = test::read_text(document);
+    const auto [first, last] = test::table_place(all, name);
+    if (last != 0) {
+      all.replace(first, last - first, table);
+      if (std::ofstream(document) << all) return 0;
+    }
+    std::fprintf(stderr, "%s cannot be written, or lacks the marks of '%s'\n", document.c_str(),
+                 name.c_str());
+    return 1;
+  }
+
+  const std::string& document() const { return document_; }
+
+ private:
+  std::string document_;
+};
+
+/// A CSV file. The names of the first row's values become its header.
+class CsvFile {
+ public:
+  /// Ends the program with a message if the file cannot be written.
+  explicit CsvFile(const std::string& path) : file_(path) {
+    if (file_) return;
+    std::fprintf(stderr, "cannot write %s\n", path.c_str());
+    std::exit(2);
+  }
+
+  template <class Value>
+  CsvFile& add(const std::string& name, const Value& value) {
+    const char* comma = row_.tellp() > 0 ? "," : "";
+    header_ += comma + name;
+    if constexpr (std::is_convertible_v<Value, std::string>) {
+      row_ << comma << std::quoted(std::string(value));
+    } else {
+      row_ << comma << value;
+    }
+    return *this;
+  }
+  void end_row() {
+    if (!has_header_) file_ << header_ << "\n";
+    has_header_ = true;
+    file_ << row_.str() << "\n" << std::flush;
+    row_.str("");
+    header_.clear();
   }
 
  private:
-  std::vector<std::string> words_;
+  std::ofstream file_;
+  std::ostringstream row_;
+  std::string header_;
+  bool has_header_ = false;
 };
 
-/// Calls `work` for 0 to count - 1, in so many threads.
-inline void for_each(std::size_t count, std::size_t threads,
-                     const std::function<void(std::size_t)>& work) {
+/// Calls `work` for 0 to count - 1, in as many threads as the machine has.
+inline void for_each(std::size_t count, const std::function<void(std::size_t)>& work) {
   std::atomic<std::size_t> next{0};
-  const auto take = [&] {
-    for (std::size_t i = next++; i < count; i = next++) work(i);
-  };
-  std::vector<std::thread> pool;
-  for (std::size_t t = 1; t < threads; ++t) pool.emplace_back(take);
-  take();
-  for (std::thread& thread : pool) thread.join();
+  std::vector<std::future<void>> threads;
+  for (unsigned t = 0; t < std::max(1U, std::thread::hardware_concurrency()); ++t) {
+    threads.push_back(std::async(std::launch::async, [&] {
+      for (std::size_t i = next++; i < count; i = next++) work(i);
+    }));
+  }
 }
 
 using Clock = std::chrono::steady_clock;

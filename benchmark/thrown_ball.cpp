@@ -5,16 +5,13 @@
 // Usage: thrown_ball [--first SEED] [--count N] [--update-doc doc/benchmark.md]
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
-#include "document.h"
 #include "ist_proximity/facade/obstacles.h"
 #include "ist_proximity/proximity/joint_trajectory.h"
 #include "ist_proximity/proximity/time_of_impact.h"
@@ -57,11 +54,7 @@ Ball random_ball(const Arm& arm, const StraightPieces& pieces, Random* random) {
   const double hit = uniform(random, way / speed, kDuration);
   ist::ForwardKinematics forward(*arm.model, arm.kinematics);
   forward.run(ist::positions_at(pieces, hit));
-  std::vector<std::size_t> links;
-  for (std::size_t i = 0; i < arm.moves.size(); ++i) {
-    if (arm.moves[i] && arm.model->links[i].usable()) links.push_back(i);
-  }
-  const std::size_t link = links[(*random)() % links.size()];
+  const std::size_t link = arm.random_link(random);
   const double turn = uniform(random, -1.5, 1.5), up = uniform(random, -0.2, 0.9);
   const Vector3d back(std::cos(turn) * std::cos(up), std::sin(turn) * std::cos(up), std::sin(up));
   const Vector3d past(uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3),
@@ -87,9 +80,8 @@ std::vector<float> wall_image() {
   std::vector<float> points;
   for (int v = 0; v < 480; ++v) {
     for (int u = 0; u < 640; ++u) {
-      points.push_back(static_cast<float>(kWall));
-      points.push_back(static_cast<float>(kWall * (320 - u) / 500.0));
-      points.push_back(static_cast<float>(kWall * (240 - v) / 500.0));
+      const Eigen::Vector3d p = kWall * Vector3d(1.0, (320 - u) / 500.0, (240 - v) / 500.0);
+      for (const double x : p) points.push_back(static_cast<float>(x));
     }
   }
   return points;
@@ -204,30 +196,22 @@ void run_seed(const Arm& arm, std::uint64_t seed, Totals* totals) {
   totals->moving += watched.time < kInf && !stands ? 1 : 0;
 }
 
-std::string text_of(std::size_t count, const Totals& totals) {
-  using ist::benchmark::quantile;
-  std::array<char, 512> text{};
-  std::snprintf(
-      text.data(), text.size(),
-      "Of %zu balls %d would touch; %d touched the moving arm. It stopped %d times, %d times "
-      "for a ball that\nwould have missed, by %.0f mm in the median.\n",
-      count, totals.would_touch, totals.moving, totals.stopped, totals.unneeded,
-      quantile(totals.missed, 0.5));
-  return text.data();
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-  ist::benchmark::Arguments arguments(argc, argv);
-  const auto first = arguments.count("first", 1), count = arguments.count("count", 100);
-  const std::string document = arguments.text("update-doc");
-  arguments.rest();
+  using ist::benchmark::quantile;
+  std::size_t count = 100;
+  ist::benchmark::CommandLine line("Balls that are thrown into running trajectories.");
+  line.add_option("--count", count, "Balls");
+  line.read(argc, argv);
   const Arm arm;
   Totals totals;
-  for (std::size_t i = 0; i < count; ++i) run_seed(arm, first + i, &totals);
-  const std::string text = text_of(count, totals);
-  std::printf("%s", text.c_str());
-  if (document.empty()) return 0;
-  return ist::benchmark::write_table(document, "thrown ball", text) ? 0 : 1;
+  for (std::size_t i = 0; i < count; ++i) run_seed(arm, i + 1, &totals);
+  return line.publish(
+      "thrown ball",
+      ist::benchmark::text_of(
+          "Of %zu balls %d would touch; %d touched the moving arm. It stopped %d times, %d times "
+          "for a ball that\nwould have missed, by %.0f mm in the median.\n",
+          count, totals.would_touch, totals.moving, totals.stopped, totals.unneeded,
+          quantile(totals.missed, 0.5)));
 }

@@ -1,20 +1,15 @@
 // Links against a known world, beside FCL in the same run: two arms in one cell, and a
-// cell of meshes with a thousand objects that are far. Motions at 1 kHz. With a document, writes
-// its table there.
-//
-// Usage: world [DOCUMENT] [steps]
+// cell of meshes with a thousand objects that are far. Motions at 1 kHz.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
-#include "document.h"
+#include "fcl_geometry.h"
 #include "internal/geometry/tessellation.h"
 #include "ist_proximity/proximity/world_query.h"
 #include "ist_proximity/robot/link_poses.h"
@@ -22,15 +17,13 @@
 #include "support/demo_arm.h"
 #include "support/meshes.h"
 #include "support/scene.h"
-#ifdef IST_PROXIMITY_HAS_FCL
-#include "fcl_geometry.h"
-#endif
 
 namespace {
 
 using ist::LinkGeometry;
 using ist::WorldObject;
 using ist::benchmark::quantile;
+using ist::benchmark::text_of;
 // Peers are measured in every so many steps. They begin with what they found then.
 constexpr int kPeerStep = 20;
 
@@ -46,22 +39,12 @@ WorldObject object(const std::string& name, const ist::Shape& shape, const Eigen
   return result;
 }
 
-// Links and objects as triangles: round shapes to 0.1 mm.
-LinkGeometry as_meshes(const LinkGeometry& geometry) {
-  LinkGeometry meshes = geometry;
-  for (ist::GeometryElement& element : meshes) {
-    if (const auto* box = std::get_if<ist::Box>(&element.shape)) {
-      element.shape = ist::tessellate(*box).mesh;
-    } else if (const auto* cylinder = std::get_if<ist::Cylinder>(&element.shape)) {
-      element.shape = ist::tessellate(*cylinder, 1e-4).mesh;
-    } else if (const auto* sphere = std::get_if<ist::Sphere>(&element.shape)) {
-      element.shape = ist::tessellate(*sphere, 1e-4).mesh;
-    }
-  }
-  return meshes;
+// Links and objects as triangles: round shapes to a thousandth of their radius.
+LinkGeometry as_meshes(LinkGeometry geometry) {
+  for (ist::GeometryElement& element : geometry) element.shape = ist::mesh_of(element.shape, 1e-3);
+  return geometry;
 }
 
-#ifdef IST_PROXIMITY_HAS_FCL
 using FclObject = std::unique_ptr<fcl::CollisionObjectd>;
 
 // The elements of links or objects, each at its place in its body.
@@ -134,15 +117,12 @@ class Peer {
   fcl::DynamicAABBTreeCollisionManagerd manager_;
   std::vector<double> nearest_;
 };
-#endif
 
 struct Case {
   std::string name;
   ist::RobotDescription robot;
   std::vector<WorldObject> objects;
-  // By frame of the world and time; "cell" stands still.
-  std::shared_ptr<const ist::RobotModel> other;  // null: none
-  bool is_meshes = false;
+  bool has_other = false;  // such a robot faces this one, and moves
 };
 
 // A table, walls, a pillar, a ball, and fixtures of rings.
@@ -187,32 +167,57 @@ std::vector<LinkGeometry> shapes_of(const Case& c, const ist::RobotModel& model)
   return links;
 }
 
-// The objects of a case, and the links of the other robot if it has one.
-std::vector<WorldObject> objects_of(const Case& c, const ist::RobotModel& model,
-                                    const std::vector<LinkGeometry>& links) {
-  std::vector<WorldObject> objects = c.objects;
-  for (std::size_t i = 0; c.other && i < links.size(); ++i) {
-    WorldObject one = object("other " + model.links[i].name, ist::Sphere{1.0},
-                             Eigen::Vector3d::Zero(), "other " + model.links[i].name);
-    one.geometry = links[i];
-    objects.push_back(one);
+// A case's world, and where its objects are.
+class World {
+ public:
+  World(const Case& c, const ist::RobotModel& model, const std::vector<LinkGeometry>& links)
+      : objects_(c.objects) {
+    for (std::size_t i = 0; c.has_other && i < links.size(); ++i) {
+      const std::string name = "other " + model.links[i].name;
+      objects_.push_back(object(name, ist::Sphere{1.0}, Eigen::Vector3d::Zero(), name));
+      objects_.back().geometry = links[i];
+    }
+    ist::WorldBuilder builder;
+    builder.add(objects_);
+    posed_.world = builder.world();
+    posed_.X_FB.assign(posed_.world->frames().size(), Eigen::Isometry3d::Identity());
+    for (const WorldObject& one : objects_) frames_.push_back(frame_of(one.frame));
   }
-  return objects;
-}
 
-// Places the links of the other robot.
-void place_other(const ist::RobotModel& model, const ist::LinkPoses& other,
-                 ist::PosedWorld* world) {
-  for (std::size_t f = 0; f < world->X_FB.size(); ++f) {
-    for (std::size_t i = 0; i < model.links.size(); ++i) {
-      if (world->world->frames()[f] == "other " + model.links[i].name) {
-        world->X_FB[f] = other.X_FL[i];
-      }
+  // @param X_FL  of the other robot
+  void place_other(const Poses& X_FL) {
+    for (std::size_t i = 0; i < X_FL.size(); ++i) {
+      posed_.X_FB[frames_[objects_.size() - X_FL.size() + i]] = X_FL[i];
     }
   }
+
+  const ist::PosedWorld& posed() const { return posed_; }
+  const std::vector<WorldObject>& objects() const { return objects_; }
+  const std::vector<std::size_t>& frames() const { return frames_; }  // by object
+
+ private:
+  std::size_t frame_of(const std::string& name) const {
+    const auto& names = posed_.world->frames();
+    return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+  }
+
+  std::vector<WorldObject> objects_;
+  ist::PosedWorld posed_;
+  std::vector<std::size_t> frames_;
+};
+
+// How much two answers differ at most where links are apart.
+double largest_difference(const std::vector<double>& peer,
+                          const std::vector<ist::LinkProximity>& ours) {
+  double differs = 0.0;
+  for (std::size_t i = 0; i < peer.size(); ++i) {
+    if (ours[i].state != ist::LinkState::kNear || !(peer[i] > 0.0)) continue;
+    differs = std::max(differs, std::abs(peer[i] - ours[i].distance));
+  }
+  return differs;
 }
 
-// The rows of a case, at tolerances of 1 mm and 0.
+// The row of a case, at tolerances of 1 mm and 0.
 std::string measure(const Case& c, int steps) {
   ist::RobotModelConfig packing;
   packing.packing.max_error = 0.01;
@@ -220,14 +225,9 @@ std::string measure(const Case& c, int steps) {
   const auto kinematics = std::make_shared<const ist::Kinematics>(c.robot);
   ist::ForwardKinematics forward(*model, kinematics), forward_other(*model, kinematics);
   const std::vector<LinkGeometry> links = shapes_of(c, *model);
-  const std::vector<WorldObject> objects = objects_of(c, *model, links);
-  ist::WorldBuilder builder;
-  builder.add(objects);
-  ist::PosedWorld world{builder.world(), {}};
-  world.X_FB.assign(world.world->frames().size(), Eigen::Isometry3d::Identity());
-  Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();  // the other robot faces this one
-  X_FR.translation().x() = 0.9;
-  X_FR.linear() = Eigen::AngleAxisd(3.14159265, Eigen::Vector3d::UnitZ()).matrix();
+  World world(c, *model, links);
+  Eigen::Isometry3d X_FR(Eigen::AngleAxisd(EIGEN_PI, Eigen::Vector3d::UnitZ()));
+  X_FR.pretranslate(Eigen::Vector3d(0.9, 0.0, 0.0));  // the other robot faces this one
 
   const auto robot = ist::make_robot_surfaces(model);
   std::vector<std::unique_ptr<ist::WorldQuery>> queries;
@@ -236,82 +236,59 @@ std::string measure(const Case& c, int steps) {
     config.tolerance = tolerance;
     queries.push_back(std::make_unique<ist::WorldQuery>(robot, config));
   }
-  std::vector<std::size_t> frames;
-  for (const WorldObject& one : objects) {
-    const auto& names = world.world->frames();
-    frames.push_back(
-        static_cast<std::size_t>(std::find(names.begin(), names.end(), one.frame) - names.begin()));
-  }
-#ifdef IST_PROXIMITY_HAS_FCL
-  Peer peer(links, objects, frames);
-#endif
-  std::vector<double> ours[2], peers;
-  [[maybe_unused]] double differs = 0.0;
+  Peer peer(links, world.objects(), world.frames());
+  std::array<std::vector<double>, 2> ours;
+  std::vector<double> peers;
+  double differs = 0.0;
   std::vector<ist::LinkProximity> results;
   ist::benchmark::ThreadTimer timer;
   for (int step = 0; step < steps; ++step) {
     const ist::LinkPoses& poses = forward.run(position(*kinematics, 1e-3 * step, 0.0));
-    if (c.other) {
-      place_other(*model, forward_other.run(position(*kinematics, 1e-3 * step, 2.0), X_FR), &world);
+    if (c.has_other) {
+      world.place_other(forward_other.run(position(*kinematics, 1e-3 * step, 2.0), X_FR).X_FL);
     }
-    for (std::size_t k = 0; k < 2; ++k) {
+    for (std::size_t k = 0; k < ours.size(); ++k) {
       timer.lap();
-      queries[k]->run(poses.X_FL, poses.known, {&world}, ist::TimePoint::max(), &results);
+      queries[k]->run(poses.X_FL, poses.known, {&world.posed()}, ist::TimePoint::max(), &results);
       ours[k].push_back(timer.lap());
     }
-#ifdef IST_PROXIMITY_HAS_FCL
-    if (step % kPeerStep == 0) {
-      timer.lap();
-      const std::vector<double>& found = peer.run(poses.X_FL, world.X_FB, c.other != nullptr);
-      peers.push_back(timer.lap());
-      for (std::size_t i = 0; i < found.size(); ++i) {
-        if (results[i].state != ist::LinkState::kNear || !(found[i] > 0.0)) continue;
-        differs = std::max(differs, std::abs(found[i] - results[i].distance));
-      }
-    }
-#endif
+    if (step % kPeerStep > 0) continue;
+    timer.lap();
+    const std::vector<double>& found = peer.run(poses.X_FL, world.posed().X_FB, c.has_other);
+    peers.push_back(timer.lap());
+    differs = std::max(differs, largest_difference(found, results));
   }
   const double of_peer = quantile(peers, 0.5);
-  const auto ratio = [](double theirs, double of_ours) {
-    char text[32] = "-";
-    if (theirs > 0.0) std::snprintf(text, sizeof text, "%.0f", theirs / of_ours);
-    return std::string(text);
-  };
-  char row[512];
-  std::snprintf(row, sizeof row,
-                "| %s: %zu links, %zu objects | %.0f | %.0f | %.0f | %.0f | %s | %s | %.2g |\n",
-                c.name.c_str(), links.size(), objects.size(), quantile(ours[0], 0.5),
-                quantile(ours[0], 0.99), quantile(ours[1], 0.5), of_peer,
-                ratio(of_peer, quantile(ours[0], 0.5)).c_str(),
-                ratio(of_peer, quantile(ours[1], 0.5)).c_str(), 1e3 * differs);
-  std::printf("%s", row);
-  std::fflush(stdout);
-  return row;
+  const double to_1_mm = quantile(ours[0], 0.5), exact = quantile(ours[1], 0.5);
+  return text_of(
+      "| %s: %zu links, %zu objects | %.0f | %.0f | %.0f | %.0f | %.0f | %.0f | %.2g |\n",
+      c.name.c_str(), links.size(), world.objects().size(), to_1_mm, quantile(ours[0], 0.99), exact,
+      of_peer, of_peer / to_1_mm, of_peer / exact, 1e3 * differs);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::string document = argc > 1 ? argv[1] : "";
-  const int steps = argc > 2 ? std::atoi(argv[2]) : 4000;
+  int steps = 4000;
+  ist::benchmark::CommandLine line("Links against a known world, beside FCL.");
+  line.add_option("--steps", steps, "Of each motion, 1 ms apart");
+  line.read(argc, argv);
   const ist::RobotDescription arm = ist::test::demo_robot();
   ist::RobotDescription mesh_arm = arm;
   for (ist::LinkDescription& link : mesh_arm.links) link.geometry = as_meshes(link.geometry);
-  std::vector<Case> cases = {{"demo arm in a cell", arm, cell(false), nullptr, false},
-                             {"the same of meshes", mesh_arm, cell(true), nullptr, true}};
-  cases.push_back({"two arms in a cell", arm, cell(false), ist::test::demo_model(), false});
-  cases.push_back({"the same of meshes", mesh_arm, cell(true), ist::test::demo_model(), true});
-  Case far = {"with 1000 far objects", mesh_arm, cell(true), nullptr, true};
+  std::vector<Case> cases = {{"demo arm in a cell", arm, cell(false)},
+                             {"the same of meshes", mesh_arm, cell(true)},
+                             {"two arms in a cell", arm, cell(false), true},
+                             {"the same of meshes", mesh_arm, cell(true), true},
+                             {"with 1000 far objects", mesh_arm, cell(true)}};
   for (int i = 0; i < 1000; ++i) {
-    far.objects.push_back(object("far" + std::to_string(i), ist::Box{{0.2, 0.2, 0.2}},
-                                 {3.0 + i % 10, i / 10 % 10 - 5.0, i / 100.0}));
+    cases.back().objects.push_back(object("far" + std::to_string(i), ist::Box{{0.2, 0.2, 0.2}},
+                                          {3.0 + i % 10, i / 10 % 10 - 5.0, i / 100.0}));
   }
-  cases.push_back(far);
   std::string rows =
       "| scene | ours to 1 mm, median [us] | p99 [us] | ours exact, median [us] | FCL [us] "
       "| FCL / ours | FCL / exact | largest difference [mm] |\n"
       "|---|---|---|---|---|---|---|---|\n";
   for (const Case& c : cases) rows += measure(c, steps);
-  if (document.empty()) return 0;
-  return ist::benchmark::write_table(document, "known world", rows) ? 0 : 1;
+  return line.publish("known world", rows);
 }

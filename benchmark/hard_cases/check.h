@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstddef>
 #include <random>
 #include <vector>
@@ -18,15 +16,13 @@ struct Checked {
   std::size_t answers = 0;
   std::size_t wrong = 0;
   double largest_width = 0.0;  ///< [m] distance - lower_bound
-  double least_slack = 1e9;    ///< [m] truth - lower_bound; below 0 the bound is wrong
 };
 
-/// Checks the answers to one configuration. `lower_bound` has to hold for points that are likely to
-/// be nearest and for random ones. `distance` has to be that of the point named, to a quarter of
-/// the tolerance. The width of a complete answer has to be at most the tolerance.
-/// @param is_complete  false: a deadline stopped the query, and only bounds are checked
+/// Checks the answers to one configuration, which no deadline stopped. `lower_bound` has to hold
+/// for points that are likely to be nearest and for random ones. `distance` has to be that of the
+/// point named, to a quarter of the tolerance. The width has to be at most the tolerance.
 void check_answers(const HardScene& scene, const RobotModel& model, const Frame& frame,
-                   const Poses& X_FL, const QueryConfig& config, bool is_complete,
+                   const Poses& X_FL, const QueryConfig& config,
                    const std::vector<LinkProximity>& answers, std::mt19937_64* rng,
                    Checked* checked);
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
+
+#include "support/hard_shapes.h"
+#include "support/meshes.h"
 
 namespace ist::benchmark {
 namespace {
@@ -13,27 +15,6 @@ Eigen::Vector3d random_direction(std::mt19937_64* rng) {
   std::normal_distribution<double> normal;
   const double x = normal(*rng), y = normal(*rng), z = normal(*rng);
   return Eigen::Vector3d(x, y, z).normalized();
-}
-
-// Appends the rectangle of `nu` times `nv` squares that begins at `corner`, seen from u x v.
-void append_grid(const Eigen::Vector3d& corner, const Eigen::Vector3d& edge_u,
-                 const Eigen::Vector3d& edge_v, int nu, int nv, TriangleMesh* mesh) {
-  const auto first = static_cast<std::uint32_t>(mesh->vertices.size());
-  for (int i = 0; i <= nu; ++i) {
-    for (int j = 0; j <= nv; ++j) {
-      mesh->vertices.emplace_back(corner + edge_u * (static_cast<double>(i) / nu) +
-                                  edge_v * (static_cast<double>(j) / nv));
-    }
-  }
-  const auto index = [&](int i, int j) {
-    return first + static_cast<std::uint32_t>(i * (nv + 1) + j);
-  };
-  for (int i = 0; i < nu; ++i) {
-    for (int j = 0; j < nv; ++j) {
-      mesh->triangles.push_back({index(i, j), index(i + 1, j), index(i + 1, j + 1)});
-      mesh->triangles.push_back({index(i, j), index(i + 1, j + 1), index(i, j + 1)});
-    }
-  }
 }
 
 }  // namespace
@@ -107,40 +88,45 @@ std::vector<Eigen::Vector3d> sample(const std::vector<Patch>& patches, std::size
 TriangleMesh divided_box(const Eigen::Vector3d& size, double edge) {
   TriangleMesh mesh;
   const Eigen::Vector3d h = 0.5 * size;
-  for (int axis = 0; axis < 3; ++axis) {
-    const int next = (axis + 1) % 3, last = (axis + 2) % 3;
-    const Eigen::Vector3d u = size[next] * Eigen::Vector3d::Unit(next),
-                          v = size[last] * Eigen::Vector3d::Unit(last);
-    const int nu = std::max(1, static_cast<int>(std::ceil(size[next] / edge)));
-    const int nv = std::max(1, static_cast<int>(std::ceil(size[last] / edge)));
-    append_grid(-h + size[axis] * Eigen::Vector3d::Unit(axis), u, v, nu, nv, &mesh);
-    append_grid(-h, v, u, nv, nu, &mesh);
+  const Eigen::Array3i count = (size / edge).array().ceil().cast<int>();
+  for (int side = 0; side < 6; ++side) {
+    const int axis = side / 2, next = (axis + 1) % 3, last = (axis + 2) % 3;
+    const bool is_top = side % 2 == 0;
+    const auto corner = [&](int u, int v) {
+      Eigen::Vector3d p;
+      p[axis] = is_top ? h[axis] : -h[axis];
+      p[next] = size[next] * u / count[next] - h[next];
+      p[last] = size[last] * v / count[last] - h[last];
+      return p;
+    };
+    test::MeshBuilder face;
+    for (int u = 0; u < count[next]; ++u) {
+      for (int v = 0; v < count[last]; ++v) {
+        const Eigen::Vector3d across = corner(u + 1, v), along = corner(u, v + 1);
+        face.quad(corner(u, v), is_top ? across : along, corner(u + 1, v + 1),
+                  is_top ? along : across);
+      }
+    }
+    mesh = test::joined(mesh, face.mesh());
   }
   return mesh;
 }
 
 TriangleMesh bellows(double radius, double amplitude, double length, int waves) {
   constexpr int kSides = 64, kStepsPerWave = 12;
-  TriangleMesh mesh;
+  test::MeshBuilder builder;
   const int steps = waves * kStepsPerWave;
-  for (int i = 0; i <= steps; ++i) {
-    const double s = static_cast<double>(i) / steps;
+  const auto corner = [&](int i, int j) {
+    const double s = static_cast<double>(i) / steps, angle = kTwoPi * (j % kSides) / kSides;
     const double r = radius + amplitude * std::sin(kTwoPi * waves * s);
-    for (int j = 0; j < kSides; ++j) {
-      const double angle = kTwoPi * j / kSides;
-      mesh.vertices.emplace_back(r * std::cos(angle), r * std::sin(angle), (s - 0.5) * length);
-    }
-  }
-  const auto index = [](int i, int j) {
-    return static_cast<std::uint32_t>(i * kSides + j % kSides);
+    return Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), (s - 0.5) * length);
   };
   for (int i = 0; i < steps; ++i) {
     for (int j = 0; j < kSides; ++j) {
-      mesh.triangles.push_back({index(i, j), index(i, j + 1), index(i + 1, j + 1)});
-      mesh.triangles.push_back({index(i, j), index(i + 1, j + 1), index(i + 1, j)});
+      builder.quad(corner(i, j), corner(i, j + 1), corner(i + 1, j + 1), corner(i + 1, j));
     }
   }
-  return mesh;
+  return builder.mesh();
 }
 
 }  // namespace ist::benchmark

@@ -43,7 +43,7 @@ std::vector<Patch> wall_patches(const Eigen::AlignedBox3d& box, bool open);
 std::vector<Eigen::Vector3d> sample(const std::vector<Patch>& patches, std::size_t count,
                                     double noise, std::mt19937_64* rng);
 
-/// A box whose faces are divided into squares of at most `edge` [m].
+/// A box whose faces are divided into squares of at most `edge` [m]. Faces share no vertices.
 TriangleMesh divided_box(const Eigen::Vector3d& size, double edge);
 
 /// A corrugated tube about z without thickness, open at both ends: no inner sphere fits into it.

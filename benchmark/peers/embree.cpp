@@ -2,11 +2,10 @@
 
 #include <limits>
 
-#include "peers/flat.h"
 #include "peers/image_pyramid.h"
 
-// Embree's point query: the nearest triangle of a link's mesh, for every point that the link's box
-// does not prune; and for groups of points and those points that a group's bound does not prune.
+// Embree's point query: the nearest triangle of a link's mesh, for groups of points and those
+// points that a group's bound does not prune.
 namespace ist::benchmark {
 namespace {
 
@@ -118,59 +117,29 @@ class Surfaces {
   std::vector<Surface> surfaces_;
 };
 
-class Embree : public PrunedByBox {
- public:
-  explicit Embree(const Robot& robot) : PrunedByBox(robot), surfaces_(robot) {
-    name = "Embree point query, link boxes";
-  }
-
- protected:
-  bool closest(std::size_t link, const Eigen::Vector3f& p_L, float* distance,
-               Eigen::Vector3d* surface_L) override {
-    Eigen::Vector3f point;
-    const float d = surfaces_.closest(link, p_L, *distance, &point);
-    if (!(d < *distance)) return false;
-    *distance = d;
-    *surface_L = point.cast<double>();
-    return true;
-  }
-
- private:
-  Surfaces surfaces_;
-};
-
 // Whole groups of pixels are bounded by Embree's distance of their centre.
-class EmbreeOfGroups : public Method {
+class Embree : public OfGroups {
  public:
-  explicit EmbreeOfGroups(const Robot& robot)
-      : surfaces_(robot), last_(robot.meshes.size(), NearestPixel::kNone) {
+  explicit Embree(const Robot& robot) : OfGroups(robot), surfaces_(robot) {
     name = "Embree point query, hierarchy of spheres over the image";
     is_unsigned = true;
   }
 
-  void ingest(const Frame& frame) override {
-    pyramid_.build(frame);
-    X_FS_ = frame.X_FS;
-  }
-
-  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
+  void query(const Poses& X_FL, std::vector<Answer>* answers) override {
     for (std::size_t link = 0; link < X_FL.size(); ++link) {
-      const Eigen::Isometry3f X_LS = (X_FL[link].inverse() * X_FS_).cast<float>();
-      Eigen::Vector3f surface_L = Eigen::Vector3f::Zero();
       const auto distance = [&](const Eigen::Vector3f& p_L, float bound,
                                 Eigen::Vector3f* witness_L) {
         // A surface point near the nearest one makes the search short; NaN compares as false.
         const float near = kWiden * (p_L - *witness_L).norm() + kRounding;
         return surfaces_.closest(link, p_L, near < bound ? near : bound, witness_L);
       };
-      const NearestPixel nearest = search_.run(pyramid_, X_LS, last_[link], distance);
       // The search keeps no surface points of pixels.
-      surfaces_.closest(link, X_LS * pyramid_.point(nearest.pixel),
-                        std::numeric_limits<float>::infinity(), &surface_L);
-      last_[link] = nearest.pixel;
-      (*answers)[link] = {static_cast<double>(nearest.distance),
-                          X_FL[link] * surface_L.cast<double>(),
-                          X_FS_ * pyramid_.point(nearest.pixel).cast<double>()};
+      const auto surface = [&](const Eigen::Vector3f& p_L, float /*distance*/) {
+        Eigen::Vector3f surface_L = Eigen::Vector3f::Zero();
+        surfaces_.closest(link, p_L, std::numeric_limits<float>::infinity(), &surface_L);
+        return surface_L;
+      };
+      (*answers)[link] = find(link, X_FL[link], distance, surface);
     }
   }
 
@@ -178,17 +147,12 @@ class EmbreeOfGroups : public Method {
   static constexpr float kWiden = 1.00001F, kRounding = 1e-6F;  // [m]
 
   Surfaces surfaces_;
-  ImagePyramid pyramid_;
-  PyramidSearch search_;
-  Eigen::Isometry3d X_FS_;
-  std::vector<std::size_t> last_;  // nearest pixel by link
 };
 
 }  // namespace
 
 void add_embree(const Robot& robot, Methods* methods) {
   methods->push_back(std::make_unique<Embree>(robot));
-  methods->push_back(std::make_unique<EmbreeOfGroups>(robot));
 }
 
 }  // namespace ist::benchmark

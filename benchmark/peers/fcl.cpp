@@ -1,54 +1,34 @@
-#include <fcl/fcl.h>
-
 #include <algorithm>
 
+#include "fcl_geometry.h"
 #include "peers/method.h"
 
 // FCL's dual-tree distance: the link's mesh against the points as triangles without area.
 namespace ist::benchmark {
 namespace {
 
-using Model = fcl::BVHModel<fcl::OBBRSSd>;
-
-std::vector<std::shared_ptr<Model>> models_of(const Robot& robot) {
-  std::vector<std::shared_ptr<Model>> models;
-  for (const TriangleMesh& mesh : robot.meshes) {
-    std::vector<fcl::Triangle> triangles;
-    for (const TriangleMesh::Triangle& t : mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
-    models.push_back(std::make_shared<Model>());
-    models.back()->beginModel(static_cast<int>(triangles.size()),
-                              static_cast<int>(mesh.vertices.size()));
-    models.back()->addSubModel(mesh.vertices, triangles);
-    models.back()->endModel();
-  }
-  return models;
-}
-
 class Fcl : public Method {
  public:
-  explicit Fcl(const Robot& robot) : links_(models_of(robot)) {
+  explicit Fcl(const Robot& robot) {
     name = "FCL, mesh and point triangles";
-    kind = Kind::kExact;
     is_unsigned = true;
+    for (const TriangleMesh& mesh : robot.meshes) links_.push_back(fcl_geometry(mesh));
   }
 
   void ingest(const Frame& frame) override {
-    points_.read(frame);
+    read_points(frame, &points_);
     std::vector<Eigen::Vector3d> vertices;
     std::vector<fcl::Triangle> triangles;
     vertices.reserve(points_.size());
     triangles.reserve(points_.size());
     for (std::size_t i = 0; i < points_.size(); ++i) {
-      vertices.emplace_back(points_.at(i).cast<double>());
+      vertices.emplace_back(points_[i].cast<double>());
       triangles.emplace_back(i, i, i);
     }
-    cloud_ = std::make_unique<Model>();
-    cloud_->beginModel(static_cast<int>(triangles.size()), static_cast<int>(vertices.size()));
-    cloud_->addSubModel(vertices, triangles);
-    cloud_->endModel();
+    cloud_ = fcl_mesh(vertices, triangles);
   }
 
-  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
+  void query(const Poses& X_FL, std::vector<Answer>* answers) override {
     const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
     for (std::size_t link = 0; link < X_FL.size(); ++link) {
       fcl::DistanceRequestd request;
@@ -62,9 +42,9 @@ class Fcl : public Method {
   }
 
  private:
-  std::vector<std::shared_ptr<Model>> links_;
-  Points points_;
-  std::unique_ptr<Model> cloud_;
+  std::vector<std::shared_ptr<fcl::CollisionGeometryd>> links_;
+  std::vector<Eigen::Vector3f> points_;
+  std::shared_ptr<fcl::CollisionGeometryd> cloud_;
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "peers/scene.h"
+#include "peers/method.h"
 
 /// A hierarchy of bounding spheres over the pixels of a depth image, for methods that know the
 /// distance of a point to a link: a group of points is no nearer than its sphere's centre, less the
@@ -43,9 +43,7 @@ class ImagePyramid {
   std::size_t width() const { return frame_->width; }
   std::size_t height() const { return frame_->height; }
   /// A pixel's point [m] in the sensor frame; NaN where nothing was measured.
-  Eigen::Vector3f point(std::size_t pixel) const {
-    return Eigen::Map<const Eigen::Vector3f>(&frame_->data[4 * pixel]);
-  }
+  Eigen::Vector3f point(std::size_t pixel) const { return frame_->point(pixel); }
 
  private:
   const Frame* frame_ = nullptr;
@@ -173,6 +171,38 @@ class PyramidSearch {
 
   std::vector<Entry> queue_;
   NearestPixel nearest_;
+};
+
+/// A method that searches the image for each link's nearest pixel.
+class OfGroups : public Method {
+ public:
+  explicit OfGroups(const Robot& robot) : last_(robot.meshes.size(), NearestPixel::kNone) {}
+
+  void ingest(const Frame& frame) override {
+    pyramid_.build(frame);
+    X_FS_ = frame.X_FS;
+  }
+
+ protected:
+  /// @param distance  as PyramidSearch takes it
+  /// @param surface   (p_L, distance): the link's point nearest to p_L
+  template <typename Distance, typename Surface>
+  Answer find(std::size_t link, const Eigen::Isometry3d& X_FL, Distance&& distance,
+              const Surface& surface) {
+    const Eigen::Isometry3f X_LS = (X_FL.inverse() * X_FS_).cast<float>();
+    const NearestPixel nearest = search_.run(pyramid_, X_LS, last_[link], distance);
+    last_[link] = nearest.pixel;
+    const Eigen::Vector3f p_S = pyramid_.point(nearest.pixel);
+    const Eigen::Vector3f surface_L = surface(X_LS * p_S, nearest.distance);
+    return {static_cast<double>(nearest.distance), X_FL * surface_L.cast<double>(),
+            X_FS_ * p_S.cast<double>()};
+  }
+
+ private:
+  ImagePyramid pyramid_;
+  PyramidSearch search_;
+  Eigen::Isometry3d X_FS_;
+  std::vector<std::size_t> last_;  // nearest pixel by link
 };
 
 }  // namespace ist::benchmark

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,14 +18,6 @@ struct Answer {
   Eigen::Vector3d p_FCo;  ///< [m] witness point on the obstacle
 };
 
-/// The representation that distances are computed with.
-enum class Kind {
-  kOurs,     ///< the mesh, to a tolerance, by this library
-  kExact,    ///< the mesh
-  kSpheres,  ///< spheres instead of the link
-  kGrid      ///< a grid: distances of the link, or cells instead of the cloud
-};
-
 class Method {
  public:
   Method() = default;
@@ -37,12 +28,13 @@ class Method {
   /// Prepares queries from the bytes of a message.
   virtual void ingest(const Frame& frame) = 0;
 
-  /// @param X_FL     by link
   /// @param answers  one per link, overwritten
-  virtual void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) = 0;
+  virtual void query(const Poses& X_FL, std::vector<Answer>* answers) = 0;
 
   std::string name;
-  Kind kind = Kind::kExact;
+  /// What distances are computed with: "ours", the mesh to a tolerance by this library; "exact",
+  /// the mesh; "spheres" instead of the link; "grid", distances of the link at nodes.
+  std::string kind = "exact";
   std::size_t spheres = 0;
   double max_error = 0.0;  ///< [m] of the packing, for ours
   double tolerance = 0.0;  ///< [m] of the query, for ours
@@ -61,7 +53,7 @@ using Methods = std::vector<std::unique_ptr<Method>>;
 
 // Each function adds its methods. Those whose library is not installed do not exist.
 void add_ours(const Robot& robot, Methods* methods);
-void add_nanoflann(const SphereSet& spheres, Methods* methods);
+void add_nanoflann(const Robot& robot, Methods* methods);
 void add_signed_grid(const Robot& robot, Methods* methods);
 void add_embree(const Robot& robot, Methods* methods);
 void add_fcl(const Robot& robot, Methods* methods);

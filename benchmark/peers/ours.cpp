@@ -1,4 +1,3 @@
-
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "peers/method.h"
@@ -18,7 +17,7 @@ class Ours : public Method {
         query_(model, config(tolerance_)),
         known_(model->links.size(), true) {
     name = "ist_proximity";
-    kind = Kind::kOurs;
+    kind = "ours";
     max_error = max_error_;
     tolerance = tolerance_;
     largest_error = tolerance + kRounding;
@@ -29,7 +28,7 @@ class Ours : public Method {
     ingest_.run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot_);
   }
 
-  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
+  void query(const Poses& X_FL, std::vector<Answer>* answers) override {
     query_.run(X_FL, known_, {&snapshot_}, &results_);
     for (std::size_t i = 0; i < results_.size(); ++i) {
       (*answers)[i] = {results_[i].distance, results_[i].p_FCl, results_[i].p_FCo};

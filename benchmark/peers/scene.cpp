@@ -1,12 +1,10 @@
 #include "peers/scene.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numeric>
+#include <memory>
 #include <random>
 
-#include "ist_proximity/geometry/shapes.h"
+#include "support/robot_of_links.h"
 
 namespace ist::benchmark {
 
@@ -15,6 +13,14 @@ RawCloud Frame::raw() const {
   // The frame does not change while its snapshots are queried.
   cloud.owner = std::shared_ptr<const void>(std::shared_ptr<void>(), data.data());
   return cloud;
+}
+
+Frame make_frame(const std::vector<Eigen::Vector3f>& points, const Eigen::Isometry3d& X_FS) {
+  Frame frame{640, points.size() / 640, {}, X_FS};
+  for (const Eigen::Vector3f& p : points) {
+    frame.data.insert(frame.data.end(), {p.x(), p.y(), p.z(), 0.0F});
+  }
+  return frame;
 }
 
 Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng) {
@@ -28,84 +34,41 @@ Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng) {
   return next;
 }
 
-void Points::read(const Frame& frame) {
-  const std::size_t n = frame.width * frame.height;
-  x.resize(n);
-  y.resize(n);
-  z.resize(n);
-  const Eigen::Matrix3f R = frame.X_FS.linear().cast<float>();
-  const Eigen::Vector3f t = frame.X_FS.translation().cast<float>();
+void read_points(const Frame& frame, std::vector<Eigen::Vector3f>* points) {
+  const Eigen::Isometry3f X_FS = frame.X_FS.cast<float>();
+  points->resize(frame.size());
   std::size_t used = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Eigen::Vector3f p =
-        R * Eigen::Vector3f(frame.data[4 * i], frame.data[4 * i + 1], frame.data[4 * i + 2]) + t;
-    x[used] = p.x();
-    y[used] = p.y();
-    z[used] = p.z();
-    used += std::isfinite(p.x() + p.y() + p.z()) ? 1 : 0;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    Eigen::Vector3f& p = (*points)[used];
+    p = X_FS * frame.point(i);
+    used += std::isfinite(p.sum()) ? 1 : 0;
   }
-  x.resize(used);
-  y.resize(used);
-  z.resize(used);
+  points->resize(used);
 }
 
-std::shared_ptr<const RobotModel> Robot::pack(double max_error, int max_spheres) const {
-  RobotDescription description;
-  for (const TriangleMesh& mesh : meshes) {
-    LinkDescription link;
-    link.name = "link" + std::to_string(description.links.size());
-    link.geometry = {GeometryElement{mesh, Eigen::Isometry3d::Identity(), link.name}};
-    description.links.push_back(std::move(link));
-  }
+std::shared_ptr<const RobotModel> packed(const RobotDescription& robot,
+                                         const std::string& cache_directory, double max_error) {
   RobotModelConfig config;
-  config.distance_fields = true;  // as the node has them
+  config.distance_fields = true;
   config.packing.max_error = max_error;
-  config.packing.max_spheres = max_spheres;
   config.cache_directory = cache_directory;
-  return build_robot_model(description, config);
+  return build_robot_model(robot, config);
 }
 
-std::size_t SphereSet::size() const {
-  std::size_t count = 0;
-  for (const auto& link : links) count += link.size();
-  return count;
-}
-
-SphereSet few_spheres(const Robot& robot, std::size_t wanted) {
-  const auto count = [](const RobotModel& model) {
-    std::size_t spheres = 0;
-    for (const LinkModel& link : model.links) spheres += link.packing.spheres.size();
-    return spheres;
-  };
-  double low = 0.002, high = 0.2;  // [m] with many and with few spheres
-  std::shared_ptr<const RobotModel> best;
-  const auto miss = [&](const RobotModel& model) {
-    return std::abs(static_cast<double>(count(model)) - static_cast<double>(wanted));
-  };
-  for (int i = 0; i < 8; ++i) {
-    const double middle = std::sqrt(low * high);
-    const auto model = robot.pack(middle);
-    if (!best || miss(*model) < miss(*best)) best = model;
-    (count(*model) > wanted ? low : high) = middle;
+std::shared_ptr<const RobotModel> Robot::pack(double max_error) const {
+  std::vector<LinkGeometry> links;
+  for (const TriangleMesh& mesh : meshes) {
+    links.push_back({GeometryElement{mesh, Eigen::Isometry3d::Identity(), "mesh"}});
   }
-  SphereSet set;
-  for (const LinkModel& link : best->links) {
-    std::vector<SphereSet::Sphere> spheres;
-    for (const InnerSphere& sphere : link.packing.spheres)
-      spheres.push_back({sphere.center, sphere.radius});
-    set.links.push_back(std::move(spheres));
-    set.gap = std::max(set.gap, link.packing.certificate.max_gap);
-  }
-  return set;
+  return packed(test::robot_of(links), cache_directory, max_error);
 }
 
-std::vector<std::vector<Eigen::Isometry3d>> interpolated(
-    const std::vector<std::vector<Eigen::Isometry3d>>& poses, int steps) {
-  std::vector<std::vector<Eigen::Isometry3d>> motion;
+std::vector<Poses> interpolated(const std::vector<Poses>& poses, int steps) {
+  std::vector<Poses> motion;
   for (std::size_t k = 0; k + 1 < poses.size(); ++k) {
     for (int step = 0; step < steps; ++step) {
       const double s = static_cast<double>(step) / steps;
-      std::vector<Eigen::Isometry3d> X_FL;
+      Poses X_FL;
       for (std::size_t i = 0; i < poses[k].size(); ++i) {
         const Eigen::Isometry3d &a = poses[k][i], &b = poses[k + 1][i];
         const Eigen::Quaterniond q(a.linear()), r(b.linear());

@@ -6,7 +6,6 @@
 #include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/geometry/solid.h"
 #include "peers/image_pyramid.h"
-#include "peers/method.h"
 
 // Precomputed signed distances around each link, fine near it and coarse farther away, looked up
 // for groups of pixels: a group's points are no nearer than its centre, less the group's radius.
@@ -104,10 +103,10 @@ class LinkGrid {
   Grid fine_, coarse_;
 };
 
-class GridOfGroups : public Method {
+class SignedGrid : public OfGroups {
  public:
-  explicit GridOfGroups(const Robot& robot) : last_(robot.meshes.size(), NearestPixel::kNone) {
-    kind = Kind::kGrid;
+  explicit SignedGrid(const Robot& robot) : OfGroups(robot) {
+    kind = "grid";
     std::size_t bytes = 0;
     for (const TriangleMesh& mesh : robot.meshes) {
       grids_.emplace_back(mesh);
@@ -118,44 +117,29 @@ class GridOfGroups : public Method {
     // Within a cell the distance differs from the nodes' mean by at most half the diagonal. Outside
     // the grids, the path over their side is longer than the straight one.
     least_error = -0.5 * std::sqrt(3.0) * static_cast<double>(kCoarseCell);
-    largest_error = std::numeric_limits<double>::infinity();
-    witness_error = std::numeric_limits<double>::infinity();
+    largest_error = witness_error = std::numeric_limits<double>::infinity();
   }
 
-  void ingest(const Frame& frame) override {
-    pyramid_.build(frame);
-    X_FS_ = frame.X_FS;
-  }
-
-  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
+  void query(const Poses& X_FL, std::vector<Answer>* answers) override {
     for (std::size_t link = 0; link < X_FL.size(); ++link) {
-      const Eigen::Isometry3f X_LS = (X_FL[link].inverse() * X_FS_).cast<float>();
       const LinkGrid& grid = grids_[link];
-      const NearestPixel nearest =
-          search_.run(pyramid_, X_LS, last_[link],
-                      [&](const Eigen::Vector3f& p_L, float /*bound*/,
-                          Eigen::Vector3f* /*witness_L*/) { return grid(p_L); });
-      last_[link] = nearest.pixel;
-      const Eigen::Vector3f p_L = X_LS * pyramid_.point(nearest.pixel);
-      const Eigen::Vector3f surface_L = p_L - nearest.distance * grid.slope(p_L);
-      (*answers)[link] = {static_cast<double>(nearest.distance),
-                          X_FL[link] * surface_L.cast<double>(),
-                          X_FS_ * pyramid_.point(nearest.pixel).cast<double>()};
+      const auto distance = [&](const Eigen::Vector3f& p_L, float /*bound*/,
+                                Eigen::Vector3f* /*witness_L*/) { return grid(p_L); };
+      const auto surface = [&](const Eigen::Vector3f& p_L, float depth) {
+        return Eigen::Vector3f(p_L - depth * grid.slope(p_L));
+      };
+      (*answers)[link] = find(link, X_FL[link], distance, surface);
     }
   }
 
  private:
   std::vector<LinkGrid> grids_;
-  ImagePyramid pyramid_;
-  PyramidSearch search_;
-  Eigen::Isometry3d X_FS_;
-  std::vector<std::size_t> last_;  // nearest pixel by link
 };
 
 }  // namespace
 
 void add_signed_grid(const Robot& robot, Methods* methods) {
-  methods->push_back(std::make_unique<GridOfGroups>(robot));
+  methods->push_back(std::make_unique<SignedGrid>(robot));
 }
 
 }  // namespace ist::benchmark

@@ -4,20 +4,16 @@
 // it on an idle machine.
 //
 // Needs the test data for the Panda: IST_PROXIMITY_DATA, or ../shared/data.
-// Usage: cycle CACHE_FOLDER [--quick] [DOCUMENT]
 
 #include <ist_proximity/ProximityArray.h>
 #include <ros/serialization.h>
 
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "document.h"
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "peers/scene.h"
@@ -32,8 +28,6 @@
 namespace ist::benchmark {
 namespace {
 
-using Poses = std::vector<Eigen::Isometry3d>;
-
 constexpr std::size_t kCyclesPerCloud = 33;
 constexpr double kMaxError = 0.005;  // [m] the node's default
 
@@ -42,38 +36,37 @@ struct Trial {
   std::string name;
   std::shared_ptr<const RobotModel> robot;
   std::vector<LinkGeometry> geometry;  // by link
-  std::vector<Frame> frames;
+  Frame frame;
   std::vector<Poses> motion;  // 1 ms apart
 };
 
 enum Part { kQuery, kRepulsion, kPenetration, kMessage, kReport, kSerialize, kCycle, kParts };
-constexpr std::array<const char*, kParts> kNames = {
-    "distances", "repulsion", "contact volumes", "message", "report", "serialization", "cycle"};
 
-std::vector<Trial> trials(const std::string& cache, bool quick) {
-  std::vector<Trial> all;
+Trial demo_trial(std::size_t steps) {
   const RobotDescription demo = test::demo_robot();
   const Kinematics kinematics(demo);
-  Trial arm{"demo arm", test::demo_model(), {}, {synthetic_frame(640, 480)}, {}};
+  Trial arm{"demo arm", test::demo_model(), {}, synthetic_frame(), {}};
   for (const LinkDescription& link : demo.links) arm.geometry.push_back(link.geometry);
   std::vector<double> q(kinematics.joints().size(), 0.0);
-  const std::size_t steps = quick ? 200 : 2000;
   for (std::size_t k = 0; k < steps; ++k) {
     const double t = 1e-3 * static_cast<double>(k);
     for (std::size_t j = 0; j < q.size(); ++j) q[j] = 0.4 * std::sin(t + static_cast<double>(j));
     arm.motion.push_back(link_poses(*arm.robot, kinematics, q).X_FL);
   }
-  all.push_back(std::move(arm));
+  return arm;
+}
+
+std::vector<Trial> trials(const std::string& cache, bool quick) {
+  std::vector<Trial> all = {demo_trial(quick ? 200 : 2000)};
   const auto data = test::data_dir();
   if (!data) return all;
   const DataSet panda = kinect_data(*data, cache);
   for (const Scene& scene : panda.scenes) {
-    Trial trial{"Panda, " + scene.name, panda.robot.pack(kMaxError), {}, {scene.frame}, {}};
+    all.push_back(
+        {"Panda, " + scene.name, panda.robot.pack(kMaxError), {}, scene.frame, panda.motion});
     for (const TriangleMesh& mesh : panda.robot.meshes) {
-      trial.geometry.push_back({{mesh, Eigen::Isometry3d::Identity(), "mesh"}});
+      all.back().geometry.push_back({{mesh, Eigen::Isometry3d::Identity(), "mesh"}});
     }
-    trial.motion = panda.motion;
-    all.push_back(std::move(trial));
   }
   return all;
 }
@@ -116,9 +109,9 @@ class CycleBenchmark {
     for (std::size_t k = 0; k < trial_.motion.size(); ++k) {
       const Poses& X_FL = trial_.motion[k];
       if (k % kCyclesPerCloud == 0) {
-        const Frame& frame = trial_.frames[k / kCyclesPerCloud % trial_.frames.size()];
         solids = posed_solids(*trial_.robot, X_FL, known);
-        ingest.run(frame.raw(), frame.X_FS, solids, now_.toSec(), source_->cloud(now_));
+        ingest.run(trial_.frame.raw(), trial_.frame.X_FS, solids, now_.toSec(),
+                   source_->cloud(now_));
         warm_up_.run(*source_, *source_->newest({trial_.robot, now_, 0.0}));
       }
       now_ += ros::Duration(0.001);
@@ -167,66 +160,41 @@ class CycleBenchmark {
   std::size_t near_ = 0;  // links within the influence distance, over all cycles
 };
 
-std::string text(double us) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, us < 100.0 ? "%.1f µs" : "%.0f µs", us);
-  return buffer;
-}
+std::string time(double us) { return text_of(us < 100.0 ? "%.1f µs" : "%.0f µs", us); }
 
 std::string row(const Trial& trial, const CycleBenchmark& done) {
   const Times& times = done.times();
   const auto cycles = static_cast<double>(times[kCycle].size());
-  std::string line = "| " + trial.name;
-  char near[32];
-  std::snprintf(near, sizeof near, " | %.1f of %zu", static_cast<double>(done.near()) / cycles,
-                trial.robot->links.size());
-  line += near;
-  for (std::size_t i = 0; i < kParts; ++i) {
-    line += " | " + text(quantile(times[i], 0.5)) + " / " + text(quantile(times[i], 0.99));
+  std::string line = text_of("| %s | %.1f of %zu", trial.name.c_str(),
+                             static_cast<double>(done.near()) / cycles, trial.robot->links.size());
+  for (const std::vector<double>& part : times) {
+    line += " | " + time(quantile(part, 0.5)) + " / " + time(quantile(part, 0.99));
   }
-  char ratio[64];
-  std::snprintf(ratio, sizeof ratio, " | %.2f / %.2f |\n",
-                quantile(times[kCycle], 0.5) / quantile(times[kQuery], 0.5),
-                quantile(times[kCycle], 0.99) / quantile(times[kQuery], 0.99));
-  return line + ratio;
-}
-
-int run(const std::string& cache, bool quick, const std::string& document) {
-  ros::Time::init();
-  std::string table = "| scene | links within the influence distance";
-  std::string line = "|---|---";
-  for (const char* name : kNames) {
-    table += std::string(" | ") + name;
-    line += "|---";
-  }
-  table += " | cycle / distances |\n" + line + "|---|\n";
-  std::printf("%s", table.c_str());
-  for (const Trial& trial : trials(cache, quick)) {
-    CycleBenchmark benchmark(trial, cache);
-    benchmark.run();
-    const std::string one = row(trial, benchmark);
-    std::printf("%s", one.c_str());
-    std::fflush(stdout);
-    table += one;
-  }
-  return document.empty() || write_table(document, "benchmark cycle", table) ? 0 : 1;
+  return line + text_of(" | %.2f / %.2f |\n",
+                        quantile(times[kCycle], 0.5) / quantile(times[kQuery], 0.5),
+                        quantile(times[kCycle], 0.99) / quantile(times[kQuery], 0.99));
 }
 
 }  // namespace
 }  // namespace ist::benchmark
 
 int main(int argc, char** argv) {
-  std::vector<std::string> arguments(argv + 1, argv + argc);
+  using namespace ist::benchmark;
+  std::string cache;
   bool quick = false;
-  for (auto it = arguments.begin(); it != arguments.end(); ++it) {
-    if (*it != "--quick") continue;
-    quick = true;
-    arguments.erase(it);
-    break;
+  CommandLine line("A cycle of the node by its parts.");
+  line.add_option("cache", cache, "Folder that keeps packings")->required();
+  line.add_flag("--quick", quick, "Fewer cycles");
+  line.read(argc, argv);
+  ros::Time::init();
+  std::string table =
+      "| scene | links within the influence distance | distances | repulsion | contact volumes | "
+      "message | report | serialization | cycle | cycle / distances |\n"
+      "|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const Trial& trial : trials(cache, quick)) {
+    CycleBenchmark benchmark(trial, cache);
+    benchmark.run();
+    table += row(trial, benchmark);
   }
-  if (arguments.empty() || arguments.size() > 2) {
-    std::fprintf(stderr, "Usage: cycle CACHE_FOLDER [--quick] [DOCUMENT]\n");
-    return 2;
-  }
-  return ist::benchmark::run(arguments[0], quick, arguments.size() > 1 ? arguments[1] : "");
+  return line.publish("benchmark cycle", table);
 }

@@ -1,29 +1,22 @@
 // How soon the node cancels a goal for a ball that appears just before a moving robot: the time
 // from the stamp of the first cloud with the ball until the cancel message arrives. The node is a
 // process of its own, with 640x480 clouds at 30 Hz, joint states at 1 kHz, and a trajectory of 5 s
-// of the demo's arm a ball.
-//
-//   roscore & build/ros/benchmark/reaction [--first SEED] [--count N] [--update-doc FILE]
+// of the demo's arm a ball. A roscore must be running.
 
 #include <ros/ros.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "document.h"
 #include "internal/geometry/numbers.h"
 #include "ist_proximity/facade/obstacles.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "random_trajectory.h"
-#include "ros/latency/process.h"
 #include "ros/reaction/world.h"
 #include "support.h"
-#include "support/accuracy.h"
 #include "support/temp_dir.h"
 
 namespace ist::benchmark {
@@ -43,11 +36,7 @@ std::optional<Vector3d> ball_before(const Arm& arm, const StraightPieces& pieces
   ForwardKinematics forward(*arm.model, arm.kinematics);
   const LinkPoses later = forward.run(ist::positions_at(pieces, time + kStep));
   const LinkPoses now = forward.run(ist::positions_at(pieces, time));
-  std::vector<std::size_t> links;
-  for (std::size_t i = 0; i < arm.moves.size(); ++i) {
-    if (arm.moves[i] && arm.model->links[i].usable()) links.push_back(i);
-  }
-  const std::size_t link = links[(*random)() % links.size()];
+  const std::size_t link = arm.random_link(random);
   const Vector3d c_L = arm.model->links[link].tree.center();
   const Vector3d velocity = (later.X_FL[link] * c_L - now.X_FL[link] * c_L) / kStep;
   const double gap = velocity.norm() * uniform(random, 0.06, 0.12);
@@ -93,18 +82,7 @@ void run_seed(const Arm& arm, std::uint64_t seed, World* world, Totals* totals) 
   wait(0.2);
 }
 
-std::string text_of(const Totals& totals) {
-  std::array<char, 256> text{};
-  const std::vector<double>& times = totals.times;
-  std::snprintf(text.data(), text.size(),
-                "%.0f / %.0f / %.0f ms (median, p99, largest) from the cloud's stamp to the "
-                "cancelled goal, where\nbraking is due at once (%zu of %zu balls).\n",
-                quantile(times, 0.5), quantile(times, 0.99), quantile(times, 1.0), times.size(),
-                totals.balls);
-  return text.data();
-}
-
-bool run(std::size_t first, std::size_t count, const std::string& document) {
+std::string react(std::size_t count) {
   const test::TempDir cache;
   ros::param::set("robot_description",
                   test::read_text(IST_PROXIMITY_SOURCE_DIR "/demo/demo_arm.urdf"));
@@ -116,14 +94,17 @@ bool run(std::size_t first, std::size_t count, const std::string& document) {
   World world(arm);
   const Process node({IST_PROXIMITY_NODE, "__name:=reaction_node"});
   while (ros::ok() && !world.is_ok()) wait(0.1);
-  settle(node.pid());
+  wait(kPackingTime);
   Totals totals;
-  for (std::uint64_t seed = first; ros::ok() && totals.times.size() < count; ++seed) {
+  for (std::uint64_t seed = 1; ros::ok() && totals.times.size() < count; ++seed) {
     run_seed(arm, seed, &world, &totals);
   }
-  const std::string text = text_of(totals);
-  std::printf("%s", text.c_str());
-  return document.empty() || write_table(document, "reaction", text);
+  const std::vector<double>& times = totals.times;
+  return text_of(
+      "%.0f / %.0f / %.0f ms (median, p99, largest) from the cloud's stamp to the cancelled goal, "
+      "where\nbraking is due at once (%zu of %zu balls).\n",
+      quantile(times, 0.5), quantile(times, 0.99), quantile(times, 1.0), times.size(),
+      totals.balls);
 }
 
 }  // namespace
@@ -131,9 +112,9 @@ bool run(std::size_t first, std::size_t count, const std::string& document) {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "reaction");
-  ist::benchmark::Arguments arguments(argc, argv);
-  const auto first = arguments.count("first", 1), count = arguments.count("count", 100);
-  const std::string document = arguments.text("update-doc");
-  arguments.rest();
-  return ist::benchmark::run(first, count, document) ? 0 : 1;
+  std::size_t count = 100;
+  ist::benchmark::CommandLine line("How soon the node cancels a goal for a ball.");
+  line.add_option("--count", count, "Balls for which braking is due at once");
+  line.read(argc, argv);
+  return line.publish("reaction", ist::benchmark::react(count));
 }

@@ -2,12 +2,13 @@
 
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
+#include <ros/ros.h>
 #include <ros/spinner.h>
-#include <sensor_msgs/JointState.h>
-#include <sensor_msgs/PointCloud2.h>
-#include <std_msgs/Header.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
-#include <boost/make_shared.hpp>
+#include <string>
+#include <vector>
 
 namespace ist::benchmark {
 
@@ -25,35 +26,34 @@ class Part {
   ros::AsyncSpinner spinner_{1, &queue_};
 };
 
-/// The least that any node does with the same messages. Joint states are published unchanged on
-/// `relayed`. Clouds are received, or also copied, and their header is published on `seen`.
-class Relay {
+/// A child process that ends with this object.
+class Process {
  public:
-  explicit Relay(bool copies_clouds) {
-    relayed_ = states_.nh().advertise<sensor_msgs::JointState>("relayed", 100);
-    seen_ = clouds_.nh().advertise<std_msgs::Header>("seen", 100);
-    on_state_ = states_.nh().subscribe<sensor_msgs::JointState>(
-        "joint_states", 100,
-        [this](const sensor_msgs::JointStateConstPtr& m) { relayed_.publish(m); },
-        ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
-    on_cloud_ = clouds_.nh().subscribe<sensor_msgs::PointCloud2>(
-        "cloud", 2, [this, copies_clouds](const sensor_msgs::PointCloud2ConstPtr& m) {
-          if (copies_clouds) copy_ = boost::make_shared<sensor_msgs::PointCloud2>(*m);
-          seen_.publish(boost::make_shared<std_msgs::Header>(m->header));
-        });
-    states_.start();
-    clouds_.start();
+  explicit Process(std::vector<std::string> command) : pid_(fork()) {
+    if (pid_ != 0) return;
+    std::vector<char*> words;
+    for (std::string& word : command) words.push_back(word.data());
+    words.push_back(nullptr);
+    execv(words[0], words.data());
+    _exit(127);
   }
-  ~Relay() {
-    states_.stop();
-    clouds_.stop();
+  ~Process() {
+    kill(pid_, SIGINT);
+    waitpid(pid_, nullptr, 0);
   }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
 
  private:
-  Part states_, clouds_;
-  ros::Publisher relayed_, seen_;
-  ros::Subscriber on_state_, on_cloud_;
-  sensor_msgs::PointCloud2Ptr copy_;
+  pid_t pid_;
 };
+
+/// [s] After the first answer the node packs finer spheres, distance fields and contact volumes. On
+/// two cores it needs a third of this for the Panda.
+constexpr double kPackingTime = 60.0;
+
+inline void wait(double seconds) {
+  for (double t = 0.0; ros::ok() && t < seconds; t += 0.05) ros::WallDuration(0.05).sleep();
+}
 
 }  // namespace ist::benchmark

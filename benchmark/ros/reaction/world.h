@@ -4,14 +4,12 @@
 #include <ist_proximity/ProximityArray.h>
 #include <ist_proximity/TrajectoryClearance.h>
 #include <ros/ros.h>
-#include <sensor_msgs/JointState.h>
 #include <trajectory_msgs/JointTrajectory.h>
 
 #include <atomic>
 #include <cmath>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "depth_camera.h"
@@ -19,7 +17,6 @@
 #include "random_trajectory.h"
 #include "ray_shape.h"
 #include "ros/latency/part.h"
-#include "ros/latency/process.h"
 #include "ros/latency/traffic.h"
 
 namespace ist::benchmark {
@@ -37,32 +34,11 @@ inline sim::DepthCameraConfig camera_config() {
   return config;
 }
 
-/// The camera, which sees a wall behind the robot and a ball where there is one.
-class Scene {
- public:
-  sensor_msgs::PointCloud2 picture(const std::optional<Eigen::Vector3d>& ball) {
-    std::vector<sim::Body> bodies;
-    if (ball) bodies.push_back({&ball_, Eigen::Isometry3d(Eigen::Translation3d(*ball))});
-    return make_cloud(camera_.picture(bodies, &random_));
-  }
-  bool sees(const Eigen::Vector3d& p_F) const { return camera_.has_in_view(p_F); }
-
- private:
-  sim::Rng random_;
-  const sim::RayShape ball_{Shape(Sphere{kRadius})}, wall_{Shape(Box{{0.1, 8.0, 8.0}})};
-  const sim::DepthCamera camera_{
-      camera_config(), {{&wall_, Eigen::Isometry3d(Eigen::Translation3d(-1.5, 0.0, 0.5))}}};
-};
-
 /// The robot, which follows its trajectory, the camera, and what the node says. Thread safe.
 class World {
  public:
   explicit World(const Arm& arm) : arm_(arm) {
     ros::NodeHandle& nh = part_.nh();
-    static_tf_ = nh.advertise<tf2_msgs::TFMessage>("/tf_static", 1, true);
-    static_tf_.publish(camera_pose(arm.kinematics->bodies().front(), camera_config().X_FC));
-    states_ = nh.advertise<sensor_msgs::JointState>("joint_states", 10);
-    clouds_ = nh.advertise<sensor_msgs::PointCloud2>("cloud", 2);
     trajectories_ = nh.advertise<trajectory_msgs::JointTrajectory>("reaction_node/trajectory", 10);
     const auto hints = ros::TransportHints().tcpNoDelay();
     on_answer_ = nh.subscribe<ist_proximity::ProximityArray>(
@@ -74,19 +50,19 @@ class World {
         "arm/cancel", 100, [this](const auto&) { hear_cancel(); }, {}, hints);
     pieces_ = straight_pieces(random_trajectory(arm, &random_));
     part_.start();
-    state_thread_ = std::thread([this] { repeat(kStateRate, go_on_, [this] { send_state(); }); });
-    cloud_thread_ = std::thread([this] { repeat(kCloudRate, go_on_, [this] { send_cloud(); }); });
+    traffic_.emplace(*arm.kinematics, camera_.config().X_FC,
+                     Traffic::Source{[this](const ros::Time& stamp) { return positions(stamp); },
+                                     [this] { return picture(); },
+                                     [this](const ros::Time& stamp) { send_ball(stamp); }});
   }
   ~World() {
-    go_on_ = false;
-    state_thread_.join();
-    cloud_thread_.join();
+    traffic_.reset();
     part_.stop();
   }
 
   bool is_ok() const { return is_ok_; }
   bool is_clear() const { return is_clear_; }
-  bool sees(const Eigen::Vector3d& p_F) const { return scene_.sees(p_F); }
+  bool sees(const Eigen::Vector3d& p_F) const { return camera_.has_in_view(p_F); }
 
   /// The robot goes to the trajectory's begin, and sends it.
   void begin(const JointTrajectory& path, const StraightPieces& pieces) {
@@ -147,29 +123,25 @@ class World {
     return message;
   }
 
-  void send_state() {
-    sensor_msgs::JointState message;
+  std::vector<double> positions(const ros::Time& stamp) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    message.header.stamp = ros::Time::now();
-    const auto q = ist::positions_at(pieces_, (message.header.stamp - start_).toSec());
-    for (std::size_t j = 0; j < q.size(); ++j) {
-      if (std::isnan(q[j])) continue;
-      message.name.push_back(arm_.kinematics->joints()[j].name);
-      message.position.push_back(q[j]);
-    }
-    states_.publish(message);
+    return ist::positions_at(pieces_, (stamp - start_).toSec());
   }
 
-  void send_cloud() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    const std::optional<Eigen::Vector3d> ball = ball_;
-    lock.unlock();
-    sensor_msgs::PointCloud2 cloud = scene_.picture(ball);
-    cloud.header.stamp = ros::Time::now();
-    lock.lock();
-    if (ball && ball_stamp_.isZero()) ball_stamp_ = cloud.header.stamp;
-    lock.unlock();
-    clouds_.publish(cloud);
+  sensor_msgs::PointCloud2Ptr picture() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      seen_ball_ = ball_;
+    }
+    std::vector<sim::Body> bodies;
+    if (seen_ball_) {
+      bodies.push_back({&ball_shape_, Eigen::Isometry3d(Eigen::Translation3d(*seen_ball_))});
+    }
+    return make_cloud(camera_.picture(bodies, &noise_));
+  }
+  void send_ball(const ros::Time& stamp) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (seen_ball_ && ball_stamp_.isZero()) ball_stamp_ = stamp;
   }
 
   void hear(const ist_proximity::ProximityArray& message) {
@@ -193,11 +165,16 @@ class World {
 
   const Arm& arm_;
   Random random_;
-  Scene scene_;
+  // The camera sees a wall behind the robot, and a ball where there is one.
+  const sim::RayShape ball_shape_{Shape(Sphere{kRadius})}, wall_{Shape(Box{{0.1, 8.0, 8.0}})};
+  const sim::DepthCamera camera_{
+      camera_config(), {{&wall_, Eigen::Isometry3d(Eigen::Translation3d(-1.5, 0.0, 0.5))}}};
+  sim::Rng noise_;
+  std::optional<Eigen::Vector3d> seen_ball_;  // [m] in the newest image
   Part part_;
-  ros::Publisher static_tf_, states_, clouds_, trajectories_;
+  ros::Publisher trajectories_;
   ros::Subscriber on_answer_, on_clearance_, on_cancel_;
-  std::atomic<bool> go_on_{true}, is_ok_{false}, is_clear_{false};
+  std::atomic<bool> is_ok_{false}, is_clear_{false};
 
   std::mutex mutex_;
   StraightPieces pieces_;
@@ -207,7 +184,7 @@ class World {
   std::optional<double> reaction_;
   bool is_due_ = false, is_unknown_ = false;
 
-  std::thread state_thread_, cloud_thread_;
+  std::optional<Traffic> traffic_;
 };
 
 }  // namespace ist::benchmark

@@ -4,13 +4,11 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "hard_cases/scene.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/robot/robot_model.h"
 
 /// Motions during which the nearest link keeps a given distance.
 namespace ist::benchmark {
@@ -23,14 +21,9 @@ struct MovingRobot {
   std::function<std::vector<Poses>(std::size_t part)> part;
 };
 
-/// The Panda with its visual and with its collision meshes, on the recorded motion.
-std::vector<MovingRobot> pandas(const std::filesystem::path& data);
-/// The demo arm, on a motion of all its joints, and stretched out level with the table.
-std::vector<MovingRobot> demo_arms();
-
-/// The Panda with its visual meshes, on parts of the recorded motion, among the recorded frames.
-std::vector<HardScene> recorded_scenes(const std::filesystem::path& data,
-                                       const std::string& cache_directory);
+/// The Panda with its visual meshes on the recorded motion; the demo arm, on a motion of all its
+/// joints, and stretched out level with the table.
+std::vector<MovingRobot> moving_robots(const std::filesystem::path& data);
 
 /// Raises or lowers the robot at each step so that its nearest link is `distance` [m] from the
 /// cloud; negative: that deep inside. The result ends where no height does that near the last one.

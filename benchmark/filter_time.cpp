@@ -1,12 +1,9 @@
-#pragma once
+// How long the velocity filter takes, and whether it allocates, with random rows of an arm among
+// obstacles.
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdio>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "ist_proximity/control/velocity_filter.h"
@@ -14,11 +11,13 @@
 #include "support/allocations.h"
 
 namespace ist::benchmark {
+namespace {
 
-/// Rows of an arm among obstacles, at random.
+constexpr Eigen::Index kJoints = 7, kRows = 40;
+constexpr std::size_t kRuns = 30000, kWarmUp = 3000;
+
 /// @param tightness  the larger, the less they allow
-inline ConstraintRows random_rows(std::mt19937_64* random, double tightness) {
-  constexpr Eigen::Index kJoints = 7, kRows = 40;
+ConstraintRows random_rows(std::mt19937_64* random, double tightness) {
   std::uniform_real_distribution<double> any(-0.8, 0.8), part(0.0, 1.0);
   ConstraintRows rows;
   rows.count = kRows;
@@ -40,31 +39,33 @@ inline ConstraintRows random_rows(std::mt19937_64* random, double tightness) {
   return rows;
 }
 
-/// Measures the processor time of a VelocityFilter with 7 joints and 40 rows, for a document.
-inline std::string filter_time(std::size_t runs) {
+std::string filter_time() {
   std::mt19937_64 random(1);
   std::normal_distribution<double> command(0.0, 1.0);
-  VelocityFilter filter({std::vector<double>(7, 2.0), {}, {}, {}});
-  std::vector<double> times, q(7, 0.0), velocity(7);
+  VelocityFilter filter({std::vector<double>(kJoints, 2.0), {}, {}, {}});
+  std::vector<double> times, q(kJoints, 0.0), velocity(kJoints);
   long allocations = 0;
-  const std::size_t warm_up = runs / 10;
-  for (std::size_t run = 0; run < runs + warm_up; ++run) {
+  for (std::size_t run = 0; run < kRuns + kWarmUp; ++run) {
     const ConstraintRows rows = random_rows(&random, std::array{0.3, 1.0, 5.0}[run % 3]);
     for (double& v : velocity) v = command(random);
     const long before = test::allocations;
     ThreadTimer timer;
     filter.run(velocity, q, rows);
     const double time = timer.lap();
-    if (run < warm_up) continue;
+    if (run < kWarmUp) continue;
     allocations += test::allocations - before;
     times.push_back(time);
   }
-  std::array<char, 256> text{};
-  std::snprintf(
-      text.data(), text.size(),
+  return text_of(
       "%.0f / %.0f / %.0f µs (median, p99, largest) with 7 joints and 40 rows, %ld allocations.\n",
       quantile(times, 0.5), quantile(times, 0.99), quantile(times, 1.0), allocations);
-  return text.data();
 }
 
+}  // namespace
 }  // namespace ist::benchmark
+
+int main(int argc, char** argv) {
+  ist::benchmark::CommandLine line("How long the velocity filter takes.");
+  line.read(argc, argv);
+  return line.publish("filter time", ist::benchmark::filter_time());
+}
