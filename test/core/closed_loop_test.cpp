@@ -39,27 +39,6 @@ TEST(ClosedLoop, TheArmDodges) {
   EXPECT_GT(collisions, 0);
 }
 
-// The speed scale alone keeps an arm within the stop distance for ever.
-TEST(ClosedLoop, TheFilterLetsTheArmLeaveTheStopDistance) {
-  const RobotDescription robot = test::demo_robot();
-  ClosedLoopConfig config;
-  config.control_period = 10;
-  const auto nominal = [&](const Scene& scene) {
-    return nominal_motion(robot, scene, config.controller);
-  };
-  const std::uint64_t scenes = test::kSanitized ? 1 : 3;
-  for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
-    const Scene scene = make_near_start(robot, seed, nominal);
-    config.avoidance = Avoidance::kSlow;
-    EXPECT_EQ(run_closed_loop(robot, test::demo_model(), scene, seed, config).goals, 0);
-    config.avoidance = Avoidance::kFilter;
-    const ClosedLoopResult filtered =
-        run_closed_loop(robot, test::demo_model(), scene, seed, config);
-    EXPECT_EQ(filtered.goals, 1) << "seed " << seed;
-    EXPECT_GT(filtered.smallest_distance, 0.01) << "seed " << seed << ": " << filtered.link;
-  }
-}
-
 // A body stands in the way of the blind arm.
 TEST(ClosedLoop, TheFilterDrivesIntoNothing) {
   const RobotDescription robot = test::demo_robot();

@@ -270,15 +270,6 @@ TEST_F(MeshIo, saysWhenThereIsNoTriangle) {
   }
 }
 
-TEST_F(MeshIo, refusesAZeroOrNonFiniteScale) {
-  const std::string path = dir_.write("mesh.stl", binary_stl(sample_box()));
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const double inf = std::numeric_limits<double>::infinity();
-  expect_says(error_of(path, {1, 0, 1}), "(1 0 1)");
-  expect_says(error_of(path, {nan, 1, 1}), "scale");
-  expect_says(error_of(path, {1, 1, inf}), "scale");
-}
-
 TEST_F(MeshIo, refusesNonFiniteVertices) {
   TriangleMesh mesh = sample_box();
   mesh.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();

@@ -252,7 +252,7 @@ TEST(PackMesh, CertificateHoldsWhenMaxSpheresIsReachedFirst) {
   expect_certificate_holds(mesh, packing, 400);
 }
 
-TEST(PackMesh, ReportsProgressAndCanBeCancelled) {
+TEST(PackMesh, ReportsProgress) {
   double last = 0.0;
   pack_mesh(test::l_shape(0.2, 0.05), {}, [&](double fraction) {
     EXPECT_GE(fraction, last);
@@ -261,11 +261,6 @@ TEST(PackMesh, ReportsProgressAndCanBeCancelled) {
     return true;
   });
   EXPECT_EQ(last, 1.0);
-  PackingConfig fine;
-  fine.max_error = 1e-4;
-  const Packing stopped =
-      pack_mesh(test::l_shape(0.2, 0.05), fine, [](double fraction) { return fraction < 0.02; });
-  EXPECT_FALSE(stopped.certificate.reached);
 }
 
 // A mesh in millimetres takes minutes. After a request to stop, no later step may start.

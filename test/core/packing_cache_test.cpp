@@ -95,15 +95,6 @@ TEST_F(PackingCacheTest, returnsTheStoredPacking) {
   EXPECT_EQ(warning, "");
 }
 
-TEST_F(PackingCacheTest, storingAgainReplaces) {
-  store(sample_packing());
-  Packing other = sample_packing();
-  other.spheres.resize(3);
-  store(other);
-  std::string warning;
-  expect_equal(cache_.load_unchecked(kKey, kManySpheres, &warning).value(), other);
-}
-
 // A writer that is killed leaves its temporary file, which nothing ever read or removed.
 TEST_F(PackingCacheTest, storingRemovesWhatKilledWritersHaveLeft) {
   const fs::path folder = store(sample_packing()).parent_path();

@@ -92,24 +92,6 @@ TEST(RobotModel, monitorsTheLinksThatAreNamedInUrdfOrder) {
   EXPECT_NE(model->links[3].error.find("not in the URDF"), std::string::npos);
 }
 
-TEST(RobotModel, repairsADamagedCacheAndSaysSo) {
-  const test::TempDir dir;
-  RobotModelConfig config;
-  config.cache_directory = dir.file("cache");
-  build_robot_model(gripper(), config);
-  for (const auto& entry : fs::directory_iterator(config.cache_directory)) {
-    fs::resize_file(entry.path(), fs::file_size(entry.path()) - 1);
-  }
-  std::vector<std::string> warnings;
-  RobotModelCallbacks callbacks;
-  callbacks.warning = [&](const std::string& text) { warnings.push_back(text); };
-  EXPECT_FALSE(build_robot_model(gripper(), config, callbacks)->links[0].from_cache);
-  EXPECT_EQ(warnings.size(), 3U);
-  warnings.clear();
-  EXPECT_TRUE(build_robot_model(gripper(), config, callbacks)->links[0].from_cache);
-  EXPECT_TRUE(warnings.empty());
-}
-
 TEST(RobotModel, worksWithoutACacheThatCannotBeWritten) {
   const test::TempDir dir;
   RobotModelConfig config;
