@@ -133,6 +133,25 @@ TEST(HoleCoherence, APointInTheOpeningIsDeeperThanThoseBelowTheFrame) {
   EXPECT_GT(jumps, test::scaled(100));
 }
 
+// Moves the link along `out`, step by step. Counts the steps after which a point of the first
+// source is inside.
+void move_out(ProximityQuery* query, const std::vector<const CloudSnapshot*>& sources,
+              const TriangleMesh& mesh, const Point& out, double way, double step, int* contacts) {
+  const std::vector<Point> stored = test::stored_points(sources[0]->index);
+  std::vector<LinkProximity> results;
+  for (double moved = 0.0; moved < way; moved += step) {
+    const Eigen::Isometry3d X_FL(Eigen::Translation3d(moved * out));
+    ASSERT_TRUE(query->run({X_FL}, {true}, sources, &results));
+    double truth = 1.0;
+    for (const Point& p : stored) {
+      truth = std::min(truth, test::oracle_signed_distance(mesh, p - X_FL.translation()));
+    }
+    ASSERT_LE(results[0].lower_bound, truth) << "after " << moved << " m, step " << step;
+    ASSERT_EQ(results[0].state == LinkState::kContact, truth < 0.0) << "after " << moved << " m";
+    *contacts += truth < 0.0 ? 1 : 0;
+  }
+}
+
 // The nearest point is above the rim, and a second one goes in through the opening. It was
 // measured, and farther: only its cover distance says that it may be inside after some more steps.
 TEST(HoleCoherence, ASecondPointGoesInUnnoticedByTheWarmStart) {
@@ -141,7 +160,6 @@ TEST(HoleCoherence, ASecondPointGoesInUnnoticedByTheWarmStart) {
   const Point out = opening(mesh);
   const auto models = models_of(mesh);
   const Point side = out.unitOrthogonal();
-  std::vector<LinkProximity> results;
   int contacts = 0;
   for (int run = 0; run < test::scaled(100); ++run) {
     QueryConfig config;
@@ -150,20 +168,8 @@ TEST(HoleCoherence, ASecondPointGoesInUnnoticedByTheWarmStart) {
     const Point through = (0.1 + test::uniform(&rng, 0.02, 0.05)) * out;
     const Point above_rim = 0.1 * side + (0.1 + test::uniform(&rng, 0.08, 0.09)) * out;
     const CloudSnapshot cloud = test::make_snapshot({through, above_rim});
-    const std::vector<Point> stored = test::stored_points(cloud.index);
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
     const double step = std::pow(10.0, test::uniform(&rng, -3.5, -2));
-    for (double moved = 0.0; moved < 0.07; moved += step) {
-      X_FL.translation() = moved * out;
-      ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud}, &results));
-      double truth = 1.0;
-      for (const Point& p : stored) {
-        truth = std::min(truth, test::oracle_signed_distance(mesh, p - X_FL.translation()));
-      }
-      ASSERT_LE(results[0].lower_bound, truth) << run << ": after " << moved << " m";
-      ASSERT_EQ(results[0].state == LinkState::kContact, truth < 0.0) << run;
-      contacts += truth < 0.0 ? 1 : 0;
-    }
+    move_out(&query, {&cloud}, mesh, out, 0.07, step, &contacts);
   }
   EXPECT_GT(contacts, 100);
 }
@@ -192,8 +198,7 @@ TEST(HoleCoherence, APointThatOnlyTheFrontHoldsGoesInThroughTheOpening) {
     const CloudSnapshot cloud = test::make_snapshot(points);
     const CloudSnapshot far = test::make_snapshot({-0.5 * side});
     const CloudSnapshot far_again = test::make_snapshot({-0.51 * side});
-    const std::vector<Point> stored = test::stored_points(cloud.index);
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
     ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud, &far}, &results));
     config.max_distance = 0.1;
     query.set_config(config);
@@ -201,17 +206,7 @@ TEST(HoleCoherence, APointThatOnlyTheFrontHoldsGoesInThroughTheOpening) {
     config.max_distance = 0.005;
     query.set_config(config);
     const double step = std::pow(10.0, test::uniform(&rng, -4, -2));
-    for (double moved = 0.0; moved < height + 0.01; moved += step) {
-      X_FL.translation() = moved * out;
-      ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud, &far_again}, &results));
-      double truth = 1.0;
-      for (const Point& p : stored) {
-        truth = std::min(truth, test::oracle_signed_distance(mesh, p - X_FL.translation()));
-      }
-      ASSERT_LE(results[0].lower_bound, truth) << run << ": after " << moved << " m";
-      ASSERT_EQ(results[0].state == LinkState::kContact, truth < 0.0) << run;
-      contacts += truth < 0.0 ? 1 : 0;
-    }
+    move_out(&query, {&cloud, &far_again}, mesh, out, height + 0.01, step, &contacts);
   }
   EXPECT_GT(contacts, test::scaled(50));
 }

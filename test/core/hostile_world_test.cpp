@@ -21,6 +21,7 @@
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/world_oracle.h"
+#include "support/worlds.h"
 
 namespace ist {
 namespace {
@@ -200,20 +201,6 @@ TEST(HostileWorld, NoBoundIsAboveTheTruthWhateverComesAndGoes) {
   EXPECT_GT(answers.unfinished_queries, 0);
 }
 
-WorldObject object_of(const std::string& name, const Shape& shape) {
-  WorldObject object;
-  object.name = name;
-  object.frame = "world";
-  object.geometry = test::one(shape);
-  return object;
-}
-
-PosedWorld world_of(const WorldObject& object) {
-  WorldBuilder builder;
-  EXPECT_TRUE(builder.add({object}).empty()) << object.name;
-  return {builder.world(), {Eigen::Isometry3d::Identity()}};
-}
-
 // The answer for a ball of 0.05 m in one place.
 LinkProximity answer_at(const Eigen::Vector3d& p_F, const QueryConfig& config,
                         const PosedWorld& world) {
@@ -273,7 +260,7 @@ TEST(HostileWorld, EveryObjectIsThereOrNamed) {
   std::set<std::string> named;
   std::vector<WorldObject> objects;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
-    objects.push_back(object_of("object " + std::to_string(i), shapes[i]));
+    objects.push_back(test::object_of("object " + std::to_string(i), test::one(shapes[i])));
   }
   for (const WorldFault& fault : builder.add(objects)) {
     EXPECT_TRUE(named.insert(fault.object).second) << fault.object;
@@ -292,7 +279,7 @@ TEST(HostileWorld, EveryObjectIsThereOrNamed) {
   config.max_distance = 2.0;
   for (const WorldObject& object : objects) {
     if (there.count(object.name) == 0) continue;
-    const LinkProximity r = answer_at({0.03, 0.02, 0.6}, config, world_of(object));
+    const LinkProximity r = answer_at({0.03, 0.02, 0.6}, config, test::posed({object}));
     EXPECT_NE(r.state, LinkState::kUnknown) << object.name;
     EXPECT_FALSE(std::isnan(r.lower_bound)) << object.name;
     EXPECT_LT(r.lower_bound, 0.7) << object.name << ": " << r.lower_bound;
@@ -306,11 +293,11 @@ TEST(HostileWorld, AMarginThatRoundsMaxDistanceDownLeavesTheLinkClear) {
   config.max_distance = 0.4;
   int cut = 0;
   for (int i = 1; i < 60; ++i) {
-    WorldObject object = object_of("box", Box{{0.1, 0.1, 0.1}});
+    WorldObject object = test::object_of("box", test::one(Box{{0.1, 0.1, 0.1}}));
     object.margin = 0.01 * i;
     cut += config.max_distance + object.margin - object.margin < config.max_distance ? 1 : 0;
     const double x = 0.1 + config.max_distance + object.margin + 0.005;
-    const LinkProximity r = answer_at({x, 0.1, 0.0}, config, world_of(object));
+    const LinkProximity r = answer_at({x, 0.1, 0.0}, config, test::posed({object}));
     EXPECT_EQ(r.state, LinkState::kClear) << "margin " << object.margin;
     EXPECT_EQ(r.lower_bound, config.max_distance);
   }
@@ -332,7 +319,7 @@ TEST(HostileWorld, AFileThatNamesAnObjectTwiceIsRefused) {
 // bit of it, or in their margin or pose alone, are objects of their own.
 TEST(HostileWorld, ObjectsOfEqualGeometryShareIt) {
   const auto ball = [](const std::string& name, double radius, double x) {
-    WorldObject object = object_of(name, Sphere{radius});
+    WorldObject object = test::object_of(name, test::one(Sphere{radius}));
     object.X_BO.translation().x() = x;
     return object;
   };

@@ -84,12 +84,8 @@ TEST(Jacobian, namesTheBodyWhosePoseItNeeds) {
   const JointType types[] = {JointType::kRevolute, JointType::kFloating, JointType::kPrismatic,
                              JointType::kFixed};
   for (int i = 0; i < 4; ++i) {
-    JointDescription joint;
-    joint.name = "j" + std::to_string(i);
-    joint.type = types[i];
-    joint.parent_link = "l" + std::to_string(i);
-    joint.child_link = "l" + std::to_string(i + 1);
-    robot.joints.push_back(joint);
+    const std::string n = std::to_string(i);
+    robot.joints.push_back(test::joint("j" + n, types[i], "l" + n, "l" + std::to_string(i + 1)));
   }
   const Kinematics k(robot);
   std::vector<bool> known(5, true);

@@ -74,22 +74,11 @@ TEST(KinematicReach, BoundsEveryLinkInEveryConfiguration) {
   }
 }
 
-JointDescription joint(JointType type, const std::string& parent, const std::string& child,
-                       const Eigen::Vector3d& p_PJ) {
-  JointDescription result;
-  result.name = "to_" + child;
-  result.type = type;
-  result.parent_link = parent;
-  result.child_link = child;
-  result.X_PJ.translation() = p_PJ;
-  return result;
-}
-
 TEST(KinematicReach, OfAStretchedArm) {
   RobotDescription arm;
   arm.root_link = "l0";
-  arm.joints = {joint(JointType::kRevolute, "l0", "l1", {0.0, 0.0, 0.3}),
-                joint(JointType::kPrismatic, "l1", "l2", {0.5, 0.0, 0.0})};
+  arm.joints = {test::joint("to_l1", JointType::kRevolute, "l0", "l1", {0.0, 0.0, 0.3}),
+                test::joint("to_l2", JointType::kPrismatic, "l1", "l2", {0.5, 0.0, 0.0})};
   arm.joints[1].lower = -0.4;
   arm.joints[1].upper = 0.2;
   const auto model = spheres(3, 0.1);
@@ -105,8 +94,8 @@ TEST(KinematicReach, OfAStretchedArm) {
 TEST(RegionOfInterest, ExistsOnlyInFramesFixedToTheRoot) {
   RobotDescription robot;
   robot.root_link = "world";
-  robot.joints = {joint(JointType::kFixed, "world", "l0", {1.0, 2.0, 3.0}),
-                  joint(JointType::kRevolute, "l0", "l1", Eigen::Vector3d::Zero())};
+  robot.joints = {test::joint("to_l0", JointType::kFixed, "world", "l0", {1.0, 2.0, 3.0}),
+                  test::joint("to_l1", JointType::kRevolute, "l0", "l1")};
   const auto model = spheres(2, 0.1);
   const Kinematics kinematics(robot);
   const double far = kinematic_reach(*model, kinematics);

@@ -11,6 +11,7 @@
 
 #include "ist_proximity/control/constraint_rows.h"
 #include "support/motions.h"
+#include "support/random_robots.h"
 #include "support/sanitizers.h"
 #include "support/shape_oracle.h"
 
@@ -133,16 +134,9 @@ Kinematics two_joints() {
   RobotDescription description;
   description.root_link = "base";
   description.link_order = description.links_without_geometry = {"base", "a", "b"};
-  for (std::size_t k = 0; k < 2; ++k) {
-    JointDescription joint;
-    joint.name = k == 0 ? "first" : "second";
-    joint.parent_link = description.link_order[k];
-    joint.child_link = description.link_order[k + 1];
-    joint.type = JointType::kRevolute;
-    joint.axis = Eigen::Vector3d::UnitZ();
-    joint.X_PJ.translation().x() = static_cast<double>(k);
-    description.joints.push_back(joint);
-  }
+  description.joints = {
+      test::joint("first", JointType::kRevolute, "base", "a", {0, 0, 0}, {0, 0, 1}),
+      test::joint("second", JointType::kRevolute, "a", "b", {1, 0, 0}, {0, 0, 1})};
   return Kinematics(description);
 }
 

@@ -5,12 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "proximity/motion_bound.h"
 #include "support/motions.h"
+#include "support/random_links.h"
+#include "support/random_robots.h"
 #include "support/sanitizers.h"
 #include "support/shape_oracle.h"
+#include "support/worlds.h"
 
 namespace ist {
 namespace {
@@ -28,39 +32,17 @@ double first_impact(TimeOfImpact* impacts, const test::Arm& arm, const test::Arm
   return first;
 }
 
-// Counts motions that do not start in contact, by how the time that was found differs from the
-// true one.
-struct MotionCounts {
-  int motions = 0;   ///< all
-  int contacts = 0;  ///< with a contact
-  int close = 0;     ///< no more than 5 ms early, or without a contact that was not found either
-  int late = 0;      ///< later than the true time
-  int alarms = 0;    ///< a time was found where there is no contact
-
-  void add(double first, double truth) {
-    ++motions;
-    late += first > truth ? 1 : 0;
-    if (truth == kInf) {
-      alarms += first < kInf ? 1 : 0;
-      close += first == kInf ? 1 : 0;
-      return;
-    }
-    ++contacts;
-    close += truth - first <= 0.005 ? 1 : 0;
-  }
-};
-
 // The time is never later than the one that dense sampling finds, and in 99 % of the motions no
 // more than 5 ms earlier.
 TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   test::Rng rng(66);
-  MotionCounts counts;
-  while (counts.motions < test::scaled(1000)) {
+  test::ImpactCounts counts;
+  while (counts.all < test::scaled(1000)) {
     const test::Arm arm = test::random_arm(&rng);
     QueryConfig config;
     config.max_distance = 0.5;
     TimeOfImpact impacts(arm.model, arm.kinematics, config);
-    for (int i = 0; i < 25 && counts.motions < test::scaled(1000); ++i) {
+    for (int i = 0; i < 25 && counts.all < test::scaled(1000); ++i) {
       const test::ArmMotion motion = test::random_motion(&rng, arm);
       const double first = first_impact(&impacts, arm, motion);
       const double truth = test::sampled_impact(arm, motion);
@@ -72,31 +54,23 @@ TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
     }
   }
   EXPECT_EQ(counts.late, 0);
-  EXPECT_GE(counts.close, 0.99 * counts.motions);
-  EXPECT_LE(counts.alarms, 0.01 * counts.motions);
-  EXPECT_GT(counts.contacts, counts.motions / 4) << "motions must be hard ones";
-  EXPECT_GT(counts.motions - counts.contacts, counts.motions / 10);
+  EXPECT_GE(counts.close, 0.99 * counts.all);
+  EXPECT_LE(counts.alarms, 0.01 * counts.all);
+  EXPECT_GT(counts.contacts, counts.all / 4) << "motions must be hard ones";
+  EXPECT_GT(counts.all - counts.contacts, counts.all / 10);
 }
 
 // Balls at points, in a frame of their own.
 PosedWorld world_of_balls(const std::vector<Eigen::Vector3d>& points, double radius, double margin,
                           const Eigen::Isometry3d& X_FB) {
-  WorldBuilder builder;
   std::vector<WorldObject> balls;
   for (const Eigen::Vector3d& point : points) {
-    WorldObject ball;
-    ball.name = "ball " + std::to_string(balls.size());
-    ball.frame = "cell";
-    ball.geometry = {GeometryElement{Sphere{radius}, Eigen::Isometry3d::Identity(), "ball"}};
-    ball.X_BO.translation() = X_FB.inverse() * point;
-    ball.margin = margin;
-    balls.push_back(ball);
+    const Eigen::Isometry3d X_BO(Eigen::Translation3d(X_FB.inverse() * point));
+    const std::string name = "ball " + std::to_string(balls.size());
+    balls.push_back(test::object_of(name, test::one(Sphere{radius}), X_BO));
+    balls.back().margin = margin;
   }
-  EXPECT_TRUE(builder.add(balls).empty());
-  PosedWorld world;
-  world.world = builder.world();
-  world.X_FB.assign(world.world->frames().size(), X_FB);
-  return world;
+  return test::posed(balls, X_FB);
 }
 
 // No ball of a known world and no point of a cloud is touched before the time that is returned, and
@@ -223,21 +197,18 @@ TEST(TimeOfImpact, CarriedObjectsMoveWithTheirBodies) {
     const test::ArmMotion motion = test::random_motion(&rng, arm);
     const CarriedBalls balls = random_carried_balls(&rng, arm, motion);
     const std::size_t body = arm.bodies[balls.link];
-    WorldBuilder builder;
+    std::vector<WorldObject> objects;
     for (const Eigen::Vector3d& p_B : balls.p_B) {
-      WorldObject object;
-      object.name = "ball " + std::to_string(builder.size());
-      object.frame = arm.kinematics->bodies()[body];
-      object.geometry = {GeometryElement{Sphere{kRadius}, Eigen::Isometry3d::Identity(), "ball"}};
-      object.X_BO.translation() = p_B;
-      object.allowed_links = {object.frame};
-      ASSERT_TRUE(builder.add({object}).empty());
+      const std::string name = "ball " + std::to_string(objects.size());
+      const Eigen::Isometry3d X_BO(Eigen::Translation3d{p_B});
+      objects.push_back(test::object_of(name, test::one(Sphere{kRadius}), X_BO));
+      objects.back().frame = arm.kinematics->bodies()[body];
+      objects.back().allowed_links = {objects.back().frame};
     }
-    PosedWorld world;
-    world.world = builder.world();
     // Where the robot is now does not matter, but for bodies that cannot move.
-    world.X_FB = {may_move(*arm.kinematics, body) ? test::random_pose(&rng, 1.0)
-                                                  : test::sampled_poses(arm, motion, 0.0)[body]};
+    const PosedWorld world = test::posed(
+        objects, may_move(*arm.kinematics, body) ? test::random_pose(&rng, 1.0)
+                                                 : test::sampled_poses(arm, motion, 0.0)[body]);
     QueryConfig config;
     config.max_distance = 0.5;
     TimeOfImpact impacts(arm.model, arm.kinematics, config);
@@ -282,15 +253,9 @@ TEST(TimeOfImpact, CarriedByABodyThatIsNotKnown) {
     const std::size_t body = arm.bodies.back();
     const std::size_t joint = body - 1;
     if (arm.kinematics->joints()[joint].type == JointType::kFixed) continue;
-    WorldObject object;
-    object.name = "carried";
+    WorldObject object = test::object_of("carried", test::one(Sphere{0.1}));
     object.frame = arm.kinematics->bodies()[body];
-    object.geometry = {GeometryElement{Sphere{0.1}, Eigen::Isometry3d::Identity(), "ball"}};
-    WorldBuilder builder;
-    ASSERT_TRUE(builder.add({object}).empty());
-    PosedWorld world;
-    world.world = builder.world();
-    world.X_FB = {Eigen::Isometry3d::Identity()};
+    const PosedWorld world = test::posed({object});
     TimeOfImpact impacts(arm.model, arm.kinematics, QueryConfig());
     impacts.set_surfaces(make_robot_surfaces(arm.model), {});
     const std::size_t source = arm.kinematics->joints()[joint].source;
@@ -385,19 +350,8 @@ TEST(TimeOfImpact, unknownWhereArgumentsDoNotFit) {
 TEST(TimeOfImpact, handComputed) {
   RobotDescription robot;
   robot.root_link = "base";
-  JointDescription joint;
-  joint.name = "turn";
-  joint.type = JointType::kRevolute;
-  joint.parent_link = "base";
-  joint.child_link = "arm";
-  joint.axis = {0, 0, 1};
-  robot.joints = {joint};
-  joint = {};
-  joint.name = "tip";
-  joint.parent_link = "arm";
-  joint.child_link = "sphere";
-  joint.X_PJ.translation() = Eigen::Vector3d(1, 0, 0);
-  robot.joints.push_back(joint);
+  robot.joints = {test::joint("turn", JointType::kRevolute, "base", "arm", {0, 0, 0}, {0, 0, 1}),
+                  test::joint("tip", JointType::kFixed, "arm", "sphere", {1, 0, 0})};
   const auto model = test::make_model({Sphere{0.1}}, 0.005);
   model->links[0].name = "sphere";
   const auto kinematics = std::make_shared<const Kinematics>(robot);

@@ -103,29 +103,13 @@ double sampled_impact(const test::Arm& arm, const Groups& groups, const test::Ar
   return kInf;
 }
 
-// Counts pairs along motions that do not start in contact, as in time_of_impact_test.
-struct Counts {
-  int motions = 0, pairs = 0, contacts = 0, close = 0, late = 0, alarms = 0;
-
-  void add(double found, double truth) {
-    ++pairs;
-    late += found > truth ? 1 : 0;
-    if (truth == kInf) {
-      alarms += found < kInf ? 1 : 0;
-      close += found == kInf ? 1 : 0;
-      return;
-    }
-    ++contacts;
-    close += truth - found <= 0.005 ? 1 : 0;
-  }
-};
-
 // The time is never later than the one that dense sampling finds, and for 99 % of the
 // pairs no more than 5 ms earlier.
 TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
   test::Rng rng(71);
-  Counts counts;
-  while (counts.motions < test::scaled(400)) {
+  test::ImpactCounts counts;
+  int motions = 0;
+  while (motions < test::scaled(400)) {
     const test::Arm arm = arm_of_boxes_and_spheres(&rng);
     const std::vector<LinkPair> pairs = all_pairs(arm);
     if (pairs.empty()) continue;
@@ -135,14 +119,14 @@ TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
     config.max_distance = 0.5;
     TimeOfSelfImpact impacts(arm.model, arm.kinematics, pairs, config);
     std::vector<ImpactTime> found;
-    for (int i = 0; i < 25 && counts.motions < test::scaled(400); ++i) {
+    for (int i = 0; i < 25 && motions < test::scaled(400); ++i) {
       test::ArmMotion motion = test::random_motion(&rng, arm);
       motion.joints.duration *= 2.0;  // twice as far, as fast
       for (std::size_t j = 0; j < motion.joints.to.size(); ++j) {
         motion.joints.to[j] += motion.joints.to[j] - motion.joints.from[j];
       }
       impacts.run(motion.joints, motion.still, std::vector<bool>(pairs.size(), true), &found);
-      ++counts.motions;
+      ++motions;
       for (std::size_t k = 0; k < pairs.size(); ++k) {
         const double truth = sampled_impact(arm, groups, motion, pairs[k]);
         if (truth == 0.0) {
@@ -150,40 +134,30 @@ TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
           continue;
         }
         counts.add(found[k].time, truth);
-        EXPECT_LE(found[k].time, truth) << "motion " << counts.motions << " pair " << k;
+        EXPECT_LE(found[k].time, truth) << "motion " << motions << " pair " << k;
       }
     }
   }
-  RecordProperty("pairs", counts.pairs);
+  RecordProperty("pairs", counts.all);
   RecordProperty("contacts", counts.contacts);
   RecordProperty("close", counts.close);
   EXPECT_EQ(counts.late, 0);
-  EXPECT_GE(counts.close, 0.99 * counts.pairs);
-  EXPECT_LE(counts.alarms, 0.01 * counts.pairs);
+  EXPECT_GE(counts.close, 0.99 * counts.all);
+  EXPECT_LE(counts.alarms, 0.01 * counts.all);
   // A sanitizer leaves time for two arms only.
-  if (!test::kSanitized) EXPECT_GT(counts.contacts, counts.motions / 10) << "motions must be hard";
-  EXPECT_GT(counts.pairs - counts.contacts, counts.motions / 4);
+  if (!test::kSanitized) EXPECT_GT(counts.contacts, motions / 10) << "motions must be hard";
+  EXPECT_GT(counts.all - counts.contacts, motions / 4);
 }
 
 // A turning column carries two arms with a sphere of 0.1 m each; the second arm turns too.
 RobotDescription two_arms() {
   RobotDescription robot;
   robot.root_link = "base";
-  const auto add = [&](const char* name, JointType type, const char* parent, const char* child,
-                       const Eigen::Vector3d& at) {
-    JointDescription joint;
-    joint.name = name;
-    joint.type = type;
-    joint.parent_link = parent;
-    joint.child_link = child;
-    joint.axis = {0, 0, 1};
-    joint.X_PJ.translation() = at;
-    robot.joints.push_back(joint);
-  };
-  add("turn", JointType::kContinuous, "base", "column", {0, 0, 0});
-  add("first_tip", JointType::kFixed, "column", "first", {1, 0, 0});
-  add("swing", JointType::kContinuous, "column", "arm", {0, 0, 0});
-  add("second_tip", JointType::kFixed, "arm", "second", {0, 1, 0});
+  robot.joints = {
+      test::joint("turn", JointType::kContinuous, "base", "column", {0, 0, 0}, {0, 0, 1}),
+      test::joint("first_tip", JointType::kFixed, "column", "first", {1, 0, 0}),
+      test::joint("swing", JointType::kContinuous, "column", "arm", {0, 0, 0}, {0, 0, 1}),
+      test::joint("second_tip", JointType::kFixed, "arm", "second", {0, 1, 0})};
   return robot;
 }
 

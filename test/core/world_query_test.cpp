@@ -18,33 +18,18 @@
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/world_oracle.h"
+#include "support/worlds.h"
 
 namespace ist {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
+using test::object_of;
+using test::posed;
 
-WorldObject object_of(const std::string& name, const LinkGeometry& geometry,
-                      const Eigen::Isometry3d& X_BO = Eigen::Isometry3d::Identity()) {
-  WorldObject object;
-  object.name = name;
-  object.frame = "world";
-  object.geometry = geometry;
-  object.X_BO = X_BO;
-  return object;
-}
+constexpr double kInf = std::numeric_limits<double>::infinity();
 
 Eigen::Isometry3d at(double x, double y, double z) {
   return Eigen::Isometry3d(Eigen::Translation3d(x, y, z));
-}
-
-PosedWorld posed(const std::vector<WorldObject>& objects) {
-  WorldBuilder builder;
-  for (const WorldFault& fault : builder.add(objects)) ADD_FAILURE() << fault.text;
-  PosedWorld world;
-  world.world = builder.world();
-  world.X_FB.assign(world.world->frames().size(), Eigen::Isometry3d::Identity());
-  return world;
 }
 
 /// Random links and random objects, with their oracles.

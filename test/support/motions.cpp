@@ -113,4 +113,16 @@ double sampled_impact(const Arm& arm, const ArmMotion& motion) {
   return std::numeric_limits<double>::infinity();
 }
 
+void ImpactCounts::add(double found, double truth) {
+  ++all;
+  late += found > truth ? 1 : 0;
+  if (std::isinf(truth)) {
+    alarms += std::isinf(found) ? 0 : 1;
+    close += std::isinf(found) ? 1 : 0;
+    return;
+  }
+  ++contacts;
+  close += truth - found <= 0.005 ? 1 : 0;
+}
+
 }  // namespace ist::test

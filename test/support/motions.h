@@ -44,4 +44,15 @@ double sampled_distance(const Arm& arm, const ArmMotion& motion, double time);
 /// samples are spared: nothing here is faster than 40 m/s.
 double sampled_impact(const Arm& arm, const ArmMotion& motion);
 
+/// Counts what does not start in contact, by how the time that was found differs from the true one.
+struct ImpactCounts {
+  int all = 0;
+  int contacts = 0;  ///< with a contact
+  int close = 0;     ///< no more than 5 ms early, or without a contact that was not found either
+  int late = 0;      ///< later than the true time
+  int alarms = 0;    ///< a time was found where there is no contact
+
+  void add(double found, double truth);
+};
+
 }  // namespace ist::test
