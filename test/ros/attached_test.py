@@ -3,11 +3,9 @@
 
 import contextlib
 import os
-import sys
 import tempfile
 import threading
 import time
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -21,31 +19,20 @@ TOOL = (0.5, 0.0, 0.0)  # its middle on the ball's link
 TOOL_RADIUS = 0.05
 
 
-class AttachedTest(unittest.TestCase):
+class AttachedTest(pt.NodeTest):
+    BOX = pt.transform((0, 1.5, 0))
+
     def start(self, **parameters):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace).stand(box=pt.transform((0, 1.5, 0)))
         # Points on the tool, as the camera sees it, and an obstacle beside it.
         shell = np.random.default_rng(1).normal(size=(200, 3))
         shell *= TOOL_RADIUS / np.linalg.norm(shell, axis=1)[:, None]
         self.world.points = np.vstack([shell + TOOL, [[0.5, 0.0, 0.2]]])
         self.world.start_tf()
         self.world.start_clouds()
-        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
-        self.attach_object = self.proxy("attach_object", AttachObject)
-        self.detach_object = self.proxy("detach_object", DetachObject)
+        super().start(**parameters)
+        self.attach_object = self.node.service("attach_object", AttachObject)
+        self.detach_object = self.node.service("detach_object", DetachObject)
         return self.node
-
-    def proxy(self, name, kind):
-        proxy = rospy.ServiceProxy(self.node.name + "/" + name, kind)
-        proxy.wait_for_service(pt.TIMEOUT)
-        return proxy
-
-    def tearDown(self):
-        self.world.stop()
-        for message in self.node.messages:
-            pt.check_invariants(self, message)
-        self.assertEqual(self.node.stop(), 0)
 
     def attach(self, name="tool", link="ball_link", at=TOOL, **fields):
         fields.setdefault("shape", AttachObjectRequest.SPHERE)
@@ -190,22 +177,24 @@ class AttachedTest(unittest.TestCase):
         self.detach_well("tool")
         node.wait_for(lambda m: m.status == 0 and len(m.links) == 1, "the ball's link gone")
 
-    def start_long_attaching(self):
-        """Attaches an object whose packing takes minutes; its answer will be in self.answer."""
+    def attach_slowly(self):
+        """Its packing takes minutes."""
+        return self.attach(shape=AttachObjectRequest.CYLINDER, dimensions=[0.5, 1.0])
+
+    def start_to_pack_finely(self):
         # The ball is packed at once, because it is a sphere; a self-filter would need the box, too.
-        node = self.start(
-            links=["ball_link"],
-            self_filter=False,
-            packing={"max_error": 0.0001, "max_spheres": 1000000},
-        )
+        packing = {"max_error": 0.0001, "max_spheres": 1000000}
+        node = self.start(links=["ball_link"], self_filter=False, packing=packing)
         node.wait_for_status(ProximityArray.OK)
+
+    def start_long_attaching(self):
+        """Its answer will be in self.answer."""
+        self.start_to_pack_finely()
         self.answer = None
 
         def attach():
             with contextlib.suppress(rospy.ServiceException):  # the node ends meanwhile
-                self.answer = self.attach(
-                    shape=AttachObjectRequest.CYLINDER, dimensions=[0.5, 1.0]
-                )
+                self.answer = self.attach_slowly()
 
         thread = threading.Thread(target=attach, daemon=True)
         thread.start()
@@ -242,14 +231,9 @@ class AttachedTest(unittest.TestCase):
         self.wait_for_ball(without, 0)
 
     def test_time_is_limited(self):
-        node = self.start(
-            links=["ball_link"],
-            self_filter=False,
-            packing={"max_error": 0.0001, "max_spheres": 1000000},
-        )
-        node.wait_for_status(ProximityArray.OK)
+        self.start_to_pack_finely()
         begin = time.time()
-        answer = self.attach(shape=AttachObjectRequest.CYLINDER, dimensions=[0.5, 1.0])
+        answer = self.attach_slowly()
         self.assertFalse(answer.success)
         self.assertIn("it takes longer than 30 s", answer.message)
         self.assertLess(time.time() - begin, 33.0)
@@ -264,7 +248,4 @@ class AttachedTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("attached_test")
-    rostest.rosrun("ist_proximity", "attached_test", AttachedTest, sys.argv)
+    pt.run("attached_test", AttachedTest)

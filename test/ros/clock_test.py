@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Simulated time: no clock yet, a clock that stands still, and one that jumps back."""
 
-import sys
 import threading
 import unittest
 
@@ -47,10 +46,9 @@ class JointRobot:
     def __init__(self, namespace):
         q = {"turn": 0.3, "slide": 0.5}
         joints = JointStatesTest.joint_publisher(namespace)
-        self.world = pt.World(namespace, static=False)
-        clouds = self.world.cloud_publisher
+        self.world = pt.World(namespace, None)
         self.world.repeat(50, lambda: joints.publish(joint_state(q)))
-        self.world.repeat(20, lambda: clouds.publish(pt.cloud([[0.6, 0.6, 0.6]], "base")))
+        self.world.start_points([[0.6, 0.6, 0.6]])
         self.node = pt.ProximityNode(namespace, {"pose_source": "joint_states"}, ARM)
 
     def stop(self, test):
@@ -61,17 +59,10 @@ class JointRobot:
 
 
 class ClockTest(unittest.TestCase):
-    def count_messages(self, node, n):
-        """Waits for n more messages and returns them."""
-        begin = len(node.messages)
-        node.wait_for(lambda m: len(node.messages) >= begin + n, "%d messages" % n)
-        return node.messages[begin:]
-
     def test_clock(self):
         clock = SimulatedClock()
         node = pt.ProximityNode("/clock_test", {"rate": 50}, pt.urdf())
-        message = node.wait_for_status(ProximityArray.NO_CLOUD, "/clock")
-        self.assertTrue(pt.all_unknown(message))
+        node.wait_for_unknown(ProximityArray.NO_CLOUD, "/clock")
 
         clock.start()
         pt.wait_until(lambda: not rospy.Time.now().is_zero(), "the clock")
@@ -87,7 +78,7 @@ class ClockTest(unittest.TestCase):
 
         # The clock stands still: answers go on, and nothing becomes stale.
         clock.step = 0.0
-        frozen = self.count_messages(node, 100)[20:]
+        frozen = node.next_messages(100)[20:]
         self.assertEqual({m.status for m in frozen}, {ProximityArray.OK})
         self.assertEqual(len({m.header.stamp for m in frozen}), 1)
         clock.step = 0.005
@@ -109,11 +100,7 @@ class ClockTest(unittest.TestCase):
             new = [m for m in node.messages[begin:] if m.header.stamp < before and m.status == 0]
             for m in new:
                 self.assertLess(m.cloud_stamp, before)
-            node.wait_for(
-                lambda m: m.status == 0
-                and abs(pt.link(m, "ball_link").distance - (0.25 + 0.05 * i)) < 1e-5,
-                "the new cloud",
-            )
+            node.wait_for_distance(0.25 + 0.05 * i, "the new cloud", within=1e-5)
             robot.node.wait_for(
                 lambda m: m.status == 0 and m.header.stamp < before, "OK of the second robot"
             )
@@ -130,7 +117,7 @@ class ClockTest(unittest.TestCase):
             world.publish_transforms(
                 [pt.transform_message("base", "ball_link", pt.transform((1, 0, 0)), stamp)]
             )
-            for m in self.count_messages(node, 60):
+            for m in node.next_messages(60):
                 if m.status != ProximityArray.DEGRADED or "in the future" not in m.status_text:
                     self.assertEqual(m.status, ProximityArray.OK, m.status_text)
                 self.assertAlmostEqual(pt.link(m, "ball_link").distance, 0.35, 5)
@@ -177,7 +164,7 @@ class ClockTest(unittest.TestCase):
             begin = len(node.messages)
             clock.jump(jump)
             node.wait_for(lambda m: m.status == 0 and m.header.stamp < before, "OK after the jump")
-            self.count_messages(node, 50)
+            node.next_messages(50)
             for m in node.messages[begin:]:
                 if m.status == 0:
                     self.assertEqual(ball(m).source, "cloud/memory")
@@ -209,7 +196,4 @@ class ClockTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("clock_test")
-    rostest.rosrun("ist_proximity", "clock_test", ClockTest, sys.argv)
+    pt.run("clock_test", ClockTest)

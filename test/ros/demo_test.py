@@ -231,7 +231,4 @@ class DemoTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("demo_test")
-    rostest.rosrun("ist_proximity", "demo_test", DemoTest, sys.argv)
+    pt.run("demo_test", DemoTest)

@@ -1,11 +1,9 @@
 #!/usr/bin/env python3
 """/diagnostics: counts and doubts; topics without subscribers are not computed."""
 
-import sys
 
 import numpy as np
 import proximity_testing as pt
-import rospy
 from proximity_testing import ProximityArray
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
@@ -33,11 +31,7 @@ class DiagnosticsTest(pt.NodeTest):
         return int(self.node.diagnostic(status, key, 0))
 
     def wait_for_input(self, level, words):
-        def said():
-            status = self.node.diagnostics.get("input cloud")
-            return status and status.level == level and words in status.message
-
-        self.node.wait_until(said, words)
+        self.node.wait_for_diagnostic("input cloud", words, level)
 
     def test_idle_topics(self):
         """~markers and ~filtered_cloud are not computed without subscribers."""
@@ -102,7 +96,4 @@ class DiagnosticsTest(pt.NodeTest):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("diagnostics_test")
-    rostest.rosrun("ist_proximity", "diagnostics_test", DiagnosticsTest, sys.argv)
+    pt.run("diagnostics_test", DiagnosticsTest)

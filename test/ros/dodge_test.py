@@ -5,7 +5,6 @@ when the clouds stop, and goes on when they come back.
 The simulator makes the time, so that a busy machine makes it slower and nothing else.
 """
 
-import sys
 import threading
 import unittest
 
@@ -87,7 +86,4 @@ class DodgeTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("dodge_test")
-    rostest.rosrun("ist_proximity", "dodge_test", DodgeTest, sys.argv)
+    pt.run("dodge_test", DodgeTest)

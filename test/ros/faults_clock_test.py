@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Faults of simulated time: the clock jumps forward and back."""
 
-import sys
 import time
 
 import faults
@@ -60,7 +59,4 @@ class FaultsClockTest(faults.FaultTest):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("faults_clock_test")
-    rostest.rosrun("ist_proximity", "faults_clock_test", FaultsClockTest, sys.argv)
+    pt.run("faults_clock_test", FaultsClockTest)

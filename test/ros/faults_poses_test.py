@@ -231,8 +231,7 @@ class JointsTest(PosesTest):
         parameters.update(pose_source="joint_states")
         self.nodes.append(faults.TimedNode(self.namespace, parameters, ARM))
         self.tf = self.world.repeat(100, self.send_joints)
-        publish = self.world.cloud_publisher.publish
-        self.world.repeat(30, lambda: publish(pt.cloud(self.OBSTACLE_B, "base")))
+        self.world.start_points(self.OBSTACLE_B, rate=30)
         self.nodes[-1].wait_for_status(ProximityArray.OK)
         return self.nodes[-1]
 
@@ -281,8 +280,4 @@ for name in [name for name in dir(PosesTest) if name.startswith("test_")]:
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("faults_poses_test")
-    suite = {"tf": PosesTest, "joints": JointsTest}[sys.argv[1]]
-    rostest.rosrun("ist_proximity", "faults_" + sys.argv[1], suite, sys.argv)
+    pt.run("faults_poses_test", {"tf": PosesTest, "joints": JointsTest})

@@ -6,13 +6,11 @@ import resource
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 
 import faults
 import proximity_testing as pt
-import rospy
 from proximity_testing import ProximityArray
 
 MESH = "package://ist_proximity/demo/meshes/upper_arm.stl"
@@ -154,7 +152,4 @@ class FaultsProcessTest(faults.FaultTest):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("faults_process_test")
-    rostest.rosrun("ist_proximity", "faults_process_test", FaultsProcessTest, sys.argv)
+    pt.run("faults_process_test", FaultsProcessTest)

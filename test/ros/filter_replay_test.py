@@ -2,7 +2,6 @@
 """A recorded stream of commands, of the type that MoveIt Servo sends, through the nodelet of the filter."""
 
 import os
-import sys
 import tempfile
 import threading
 import time
@@ -140,7 +139,4 @@ class FilterReplayTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("filter_replay_test")
-    rostest.rosrun("ist_proximity", "filter_replay_test", FilterReplayTest, sys.argv)
+    pt.run("filter_replay_test", FilterReplayTest)

@@ -4,7 +4,6 @@
 import os
 import re
 import subprocess
-import sys
 import unittest
 from xml.etree import ElementTree
 from xmlrpc.client import ServerProxy
@@ -295,7 +294,4 @@ class LaunchFilesTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("launch_files_test")
-    rostest.rosrun("ist_proximity", "launch_files_test", LaunchFilesTest, sys.argv)
+    pt.run("launch_files_test", LaunchFilesTest)

@@ -6,9 +6,7 @@ hides a far one from it.
 """
 
 import os
-import sys
 import tempfile
-import unittest
 
 import genpy.dynamic
 import numpy as np
@@ -49,25 +47,18 @@ def distance_to(points):
     return np.linalg.norm(points - np.array(BALL), axis=1).min() - pt.BALL_RADIUS
 
 
-class MemoryTest(unittest.TestCase):
+class MemoryTest(pt.NodeTest):
+    BALL, BOX = pt.transform(BALL), pt.transform((0, 0, 5))
+    MAX_DISTANCE = None  # unknown space is nearer than a link is CLEAR
+
     def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace)
-        self.world.stand(pt.transform(BALL), pt.transform((0, 0, 5)))
+        super().setUp()
         self.world.start_tf()
         self.world.points = FAR
         self.clouds = self.world.start_clouds()
-        self.node = None
-
-    def tearDown(self):
-        self.world.stop()
-        if self.node:
-            self.assertEqual(self.node.stop(), 0)
 
     def start(self, **parameters):
-        parameters.setdefault("links", ["ball_link"])
-        parameters.setdefault("max_distance", 0.8)
-        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        super().start(**{"links": ["ball_link"], "max_distance": 0.8, **parameters})
 
     def ball(self, message):
         return pt.link(message, "ball_link")
@@ -123,10 +114,8 @@ class MemoryTest(unittest.TestCase):
         self.world.points = BEHIND
         self.node.wait_for(self.is_clear, "nothing near where the camera sees through")
         self.remember(15)
-        first = len(self.node.messages)
         self.world.points = NEAR
-        self.node.wait_for(lambda m: len(self.node.messages) > first + 50, "50 answers")
-        for message in self.node.messages[first:]:
+        for message in self.node.next_messages(50):
             self.assertTrue(self.is_clear(message), message)
         self.node.wait_until(
             lambda: self.node.diagnostic("input cloud/memory", "voxels in memory") not in ("", "0"),
@@ -150,8 +139,7 @@ class MemoryTest(unittest.TestCase):
         self.assertEqual((shown.id, shown.binary, shown.resolution), ("OcTree", True, VOXEL))
         self.assertEqual(shown.header.frame_id, "base")
         subscriber.unregister()
-        save = rospy.ServiceProxy(self.node.name + "/save_memory", Trigger)
-        save.wait_for_service(pt.TIMEOUT)
+        save = self.node.service("save_memory", Trigger)
         answer = save()
         self.assertTrue(answer.success, answer.message)
         self.assertTrue(os.path.getsize(path) > 100)
@@ -167,10 +155,7 @@ class MemoryTest(unittest.TestCase):
             file.truncate(os.path.getsize(path) - 5)
         self.start(memory=memory)
         self.node.wait_for(self.is_clear, "answers of the camera alone")
-        self.node.wait_until(
-            lambda: path in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),
-            "the file's fault in the diagnostics",
-        )
+        self.node.wait_for_diagnostic("input cloud/memory", path)
         # It is not overwritten: nobody knows what it held.
         with open(path, "rb") as file:
             held = file.read()
@@ -198,21 +183,14 @@ class MemoryTest(unittest.TestCase):
         count = len(self.world.clouds_sent)
         pt.wait_until(lambda: len(self.world.clouds_sent) > count + 4, "clouds without the pose")
         self.world.points = NEAR
-        self.node.wait_until(
-            lambda: "'box_link' was not known"
-            in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),
-            "that the clouds are not remembered, in the diagnostics",
-        )
-        first = len(self.node.messages)
-        self.node.wait_for(lambda m: len(self.node.messages) > first + 20, "20 answers")
-        for message in self.node.messages[first:]:
+        self.node.wait_for_diagnostic("input cloud/memory", "'box_link' was not known")
+        for message in self.node.next_messages(20):
             self.assertEqual(self.ball(message).source, "cloud/memory")
             self.assertAlmostEqual(self.ball(message).distance, distance_to(FAR), delta=2 * VOXEL)
 
     def attach_box(self, size, middle, angle=0.0):
         """Attaches a box to the ball, turned about z."""
-        attach = rospy.ServiceProxy(self.node.name + "/attach_object", AttachObject)
-        attach.wait_for_service(pt.TIMEOUT)
+        attach = self.node.service("attach_object", AttachObject)
         pose = Pose(Point(*middle), Quaternion(z=np.sin(angle / 2), w=np.cos(angle / 2)))
         box = AttachObjectRequest(name="box", link="ball_link", shape=AttachObjectRequest.BOX)
         box.dimensions, box.pose = size, pose
@@ -226,11 +204,7 @@ class MemoryTest(unittest.TestCase):
         self.world.repeat(100, lambda: publisher.publish(joint_state({"turn": turn})))
         self.world.points = far
         memory = {"enabled": True, "decay": DECAY, "resolution": VOXEL}
-        self.node = pt.ProximityNode(
-            self.namespace,
-            dict(links=["ball_link"], max_distance=0.8, memory=memory, pose_source="joint_states"),
-            TURNING_BALL,
-        )
+        self.start(urdf_text=TURNING_BALL, memory=memory, pose_source="joint_states")
         self.node.wait_for(self.is_clear, "the far patch out of reach")
         self.remember(10)
         self.world.points = patch(5.0, 0.12) * [-1, 1, 1]  # the camera turns to the wall behind it
@@ -274,11 +248,7 @@ class MemoryTest(unittest.TestCase):
         message = self.node.wait_for_status(ProximityArray.NO_CLOUD, "voxels of obstacles are lost")
         self.assertIn("max_nodes", message.status_text)
         self.assertTrue(pt.all_unknown(message))
-        self.node.wait_until(
-            lambda: "max_nodes"
-            in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),
-            "max_nodes in the diagnostics",
-        )
+        self.node.wait_for_diagnostic("input cloud/memory", "max_nodes")
 
     # The camera sees a cone of half width 0.3 x; the ball moves in it towards its side.
     def move_in_cone(self, unknown_space):
@@ -337,8 +307,7 @@ class MemoryTest(unittest.TestCase):
         )
         self.remember(10)
         first = len(self.node.messages)
-        detach = rospy.ServiceProxy(self.node.name + "/detach_object", DetachObject)
-        self.assertTrue(detach("box").success)
+        self.assertTrue(self.node.service("detach_object", DetachObject)("box").success)
         is_alone = lambda m: self.is_from("cloud")(m) and self.ball(m).box_size.z < 0.7  # noqa: E731
         begin = self.node.messages.index(self.node.wait_for(is_alone, "the box, detached", start=first))
         self.node.wait_for(near_side, "the side of what is seen, again", start=begin)
@@ -420,7 +389,4 @@ class MemoryTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("memory_test", anonymous=True)
-    rostest.rosrun("ist_proximity", "memory", MemoryTest, sys.argv)
+    pt.run("memory_test", MemoryTest, anonymous=True)

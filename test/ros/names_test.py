@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Names of frames, links, sources and namespaces: each is found, and each has a status of its own."""
 
-import sys
 
 import proximity_testing as pt
 import rospy
@@ -101,14 +100,10 @@ class NamesTest(pt.NodeTest):
         self.assertEqual(by_name["side"].status, ProximityArray.STALE_CLOUD)
 
         rear.stop()
-        message = node.wait_for_status(ProximityArray.STALE_CLOUD, "'rear'")
-        self.assertTrue(pt.all_unknown(message))
+        node.wait_for_unknown(ProximityArray.STALE_CLOUD, "'rear'")
         for publisher in publishers.values():
             publisher.unregister()
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("names_test")
-    rostest.rosrun("ist_proximity", "names_test", NamesTest, sys.argv)
+    pt.run("names_test", NamesTest)

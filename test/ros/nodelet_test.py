@@ -1,13 +1,11 @@
 #!/usr/bin/env python3
 """The nodelet: loads, measures, refuses wrong parameters without harm to its manager, unloads."""
 
-import sys
 import unittest
 
 import numpy as np
 import proximity_testing as pt
 import rosgraph
-import rospy
 from proximity_testing import ProximityArray
 
 FAR_BOX = pt.transform((0, 0.8, 0))
@@ -65,7 +63,4 @@ class NodeletTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("nodelet_test")
-    rostest.rosrun("ist_proximity", "nodelet_test", NodeletTest, sys.argv)
+    pt.run("nodelet_test", NodeletTest)

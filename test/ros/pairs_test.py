@@ -9,7 +9,6 @@ Several nodes run side by side, each with four of the options.
 import collections
 import contextlib
 import itertools
-import sys
 import time
 import unittest
 
@@ -119,8 +118,7 @@ class OptionsNode:
     def attach(self):
         if "attached" not in self.options:
             return
-        proxy = rospy.ServiceProxy(self.node.name + "/attach_object", AttachObject)
-        proxy.wait_for_service(pt.TIMEOUT)
+        proxy = self.node.service("attach_object", AttachObject)
         pose = Pose(Point(0.0, 0.0, 0.3), Quaternion(w=1.0))
         shape = AttachObjectRequest.SPHERE
         answer = proxy(name="tool", link="ball_link", pose=pose, shape=shape, dimensions=[0.02])
@@ -231,15 +229,14 @@ class PairsTest(unittest.TestCase):
         self.assertGreater(compared, 5)
 
 
-class OptionalCamerasTest(unittest.TestCase):
+class OptionalCamerasTest(pt.NodeTest):
     """Two cameras that may be missing, and what one of them remembers."""
 
+    BALL, BOX, MAX_DISTANCE = pt.transform(BALL), pt.transform((0, 0, 5)), 0.8
     DECAY = 2.0
 
     def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace)
-        self.world.stand(pt.transform(BALL), pt.transform((0, 0, 5)))
+        super().setUp()
         self.world.start_tf()
         self.side = rospy.Publisher(self.namespace + "/side", PointCloud2, queue_size=5)
         self.world.points = FAR
@@ -251,15 +248,7 @@ class OptionalCamerasTest(unittest.TestCase):
             "front": camera(required=False, memory=memory),
             "side": camera(topic="side", required=False),
         }
-        parameters = {"sources": sources, "max_distance": 0.8, "links": ["ball_link"]}
-        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
-
-    def tearDown(self):
-        self.world.stop()
-        self.side.unregister()
-        for message in self.node.messages:
-            pt.check_invariants(self, message, 0.8)
-        self.assertEqual(self.node.stop(), 0)
+        self.start(sources=sources, max_distance=0.8, links=["ball_link"])
 
     def test_what_a_silent_camera_remembers(self):
         ball = lambda m: pt.link(m, "ball_link")  # noqa: E731
@@ -299,9 +288,4 @@ class OptionalCamerasTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    kinds = {"options": PairsTest, "cameras": OptionalCamerasTest}
-    suite = sys.argv[1]
-    rospy.init_node("pairs_test", anonymous=True)
-    rostest.rosrun("ist_proximity", "pairs_" + suite, kinds[suite], sys.argv)
+    pt.run("pairs_test", {"options": PairsTest, "cameras": OptionalCamerasTest}, anonymous=True)

@@ -2,8 +2,6 @@
 """The contact wrench: zero apart, out of the obstacle in contact, without jumps, NaN where unknown."""
 
 import os
-import sys
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -37,18 +35,8 @@ def nice_of(pid, thread):
     raise AssertionError("no thread " + thread)
 
 
-class PenetrationTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace, TILT).stand(pt.transform((5, 0, 0)), box_at(-0.1))
-        self.world.points = WALL
-        self.node = None
-
-    def tearDown(self):
-        self.world.stop()
-        for message in self.node.messages:
-            pt.check_invariants(self, message)
-        self.assertEqual(self.node.stop(), 0)
+class PenetrationTest(pt.NodeTest):
+    CAMERA, BALL, BOX, POINTS = TILT, pt.transform((5, 0, 0)), box_at(-0.1), WALL
 
     def start(self, **parameters):
         # No deadline: on a busy machine it would end queries to a tolerance of 0.
@@ -58,7 +46,7 @@ class PenetrationTest(unittest.TestCase):
             "query/deadline": 0.0,
             **parameters,
         }
-        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        super().start(**parameters)
         self.world.start_tf()
         self.world.start_clouds()
         return self.node
@@ -173,7 +161,4 @@ class PenetrationTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("penetration_test")
-    rostest.rosrun("ist_proximity", "penetration_test", PenetrationTest, sys.argv)
+    pt.run("penetration_test", PenetrationTest)

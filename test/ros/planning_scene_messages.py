@@ -8,6 +8,10 @@ import functools
 import hashlib
 
 import genpy.dynamic
+import geometry_msgs.msg
+from sensor_msgs.msg import JointState, MultiDOFJointState
+from std_msgs.msg import ColorRGBA, Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 # The fields as of moveit_msgs 0.11 and later (Noetic), by message, and those that others have.
 SCENE = """string name
@@ -44,24 +48,12 @@ sensor_msgs/MultiDOFJointState multi_dof_joint_state
 AttachedCollisionObject[] attached_collision_objects
 bool is_diff
 """,
-    "sensor_msgs/JointState": "Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n"
-    "float64[] effort\n",
-    "std_msgs/Header": "uint32 seq\ntime stamp\nstring frame_id\n",
-    "sensor_msgs/MultiDOFJointState": "Header header\nstring[] joint_names\n"
-    "geometry_msgs/Transform[] transforms\ngeometry_msgs/Twist[] twist\ngeometry_msgs/Wrench[] wrench\n",
-    "geometry_msgs/Transform": "Vector3 translation\nQuaternion rotation\n",
-    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
-    "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
-    "geometry_msgs/Twist": "Vector3 linear\nVector3 angular\n",
-    "geometry_msgs/Wrench": "Vector3 force\nVector3 torque\n",
     "moveit_msgs/AttachedCollisionObject": """string link_name
 CollisionObject object
 string[] touch_links
 trajectory_msgs/JointTrajectory detach_posture
 float64 weight
 """,
-    "geometry_msgs/Pose": "Point position\nQuaternion orientation\n",
-    "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
     "object_recognition_msgs/ObjectType": "string key\nstring db\n",
     "shape_msgs/SolidPrimitive": """uint8 BOX=1
 uint8 SPHERE=2
@@ -81,25 +73,23 @@ uint8 CONE_RADIUS=1
     "shape_msgs/Mesh": "MeshTriangle[] triangles\ngeometry_msgs/Point[] vertices\n",
     "shape_msgs/MeshTriangle": "uint32[3] vertex_indices\n",
     "shape_msgs/Plane": "float64[4] coef\n",
-    "trajectory_msgs/JointTrajectory": "Header header\nstring[] joint_names\n"
-    "JointTrajectoryPoint[] points\n",
-    "trajectory_msgs/JointTrajectoryPoint": "float64[] positions\nfloat64[] velocities\n"
-    "float64[] accelerations\nfloat64[] effort\nduration time_from_start\n",
-    "geometry_msgs/TransformStamped": "Header header\nstring child_frame_id\nTransform transform\n",
     "moveit_msgs/AllowedCollisionMatrix": "string[] entry_names\nAllowedCollisionEntry[] entry_values\n"
     "string[] default_entry_names\nbool[] default_entry_values\n",
     "moveit_msgs/AllowedCollisionEntry": "bool[] enabled\n",
     "moveit_msgs/LinkPadding": "string link_name\nfloat64 padding\n",
     "moveit_msgs/LinkScale": "string link_name\nfloat64 scale\n",
     "moveit_msgs/ObjectColor": "string id\nstd_msgs/ColorRGBA color\n",
-    "std_msgs/ColorRGBA": "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n",
     "moveit_msgs/PlanningSceneWorld": "CollisionObject[] collision_objects\n"
     "octomap_msgs/OctomapWithPose octomap\n",
     "octomap_msgs/OctomapWithPose": "Header header\ngeometry_msgs/Pose origin\n"
     "octomap_msgs/Octomap octomap\n",
     "octomap_msgs/Octomap": "Header header\nbool binary\nstring id\nfloat64 resolution\nint8[] data\n",
 }
-
+# Those that are installed.
+for kind in "Point Pose Quaternion Transform TransformStamped Twist Vector3 Wrench".split():
+    OTHERS["geometry_msgs/" + kind] = getattr(geometry_msgs.msg, kind)._full_text.split("=" * 80)[0]
+for kind in (ColorRGBA, Header, JointState, JointTrajectory, JointTrajectoryPoint, MultiDOFJointState):
+    OTHERS[kind._type] = kind._full_text.split("=" * 80)[0]
 
 COMPONENTS = """uint32 SCENE_SETTINGS=1
 uint32 ROBOT_STATE=2
@@ -148,5 +138,5 @@ def planning_scene_types(is_noetic):
     definitions["moveit_msgs/CollisionObject"] = OBJECT % ((POSE, SUBFRAMES) if is_noetic else ("", ""))
     text = SCENE
     for name, fields in definitions.items():
-        text += "=" * 80 + "\nMSG: %s\n%s" % (name, fields)
+        text += "\n" + "=" * 80 + "\nMSG: %s\n%s" % (name, fields)
     return genpy.dynamic.generate_dynamic("moveit_msgs/PlanningScene", text)

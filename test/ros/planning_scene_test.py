@@ -6,7 +6,6 @@ import itertools
 import math
 import struct
 import subprocess
-import sys
 import tempfile
 import unittest
 
@@ -179,15 +178,8 @@ class PlanningSceneTest(unittest.TestCase):
         cls.world.stop()
 
     def distance(self, expected, what, source=None):
-        message = self.node.wait_for(
-            lambda m: m.status == ProximityArray.OK
-            and abs(pt.link(m, "ball_link").distance - expected) < 1e-6,
-            what,
-        )
-        ball = pt.link(message, "ball_link")
+        ball = pt.link(self.node.wait_for_distance(expected, what, source=source), "ball_link")
         self.assertLessEqual(ball.lower_bound, ball.distance)
-        if source:
-            self.assertEqual(ball.source, source)
 
     def at_post(self):
         """Nothing but the configured post is near."""
@@ -332,7 +324,7 @@ class PlanningSceneTest(unittest.TestCase):
             late.send(late.box("part", (0, 0.35, 0)))
             node.wait_for_status(ProximityArray.NO_CLOUD, "only differences (is_diff) have come")
             late.send(late.box("part", (0, 0.4, 0)), is_diff=False)
-            node.wait_for(lambda m: abs(pt.link(m, "ball_link").distance - 0.2) < 1e-6, "the part")
+            node.wait_for_distance(0.2, "the part")
             # Another publisher, whose difference changes what nobody knows, until the service tells.
             late.stop()
             late.start()
@@ -340,25 +332,17 @@ class PlanningSceneTest(unittest.TestCase):
             told = node.wait_for_status(ProximityArray.NO_CLOUD, "has another publisher than before")
             self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
             service, requests = late.serve("/late/get_planning_scene", late.box("part", (0, 0.35, 0)))
-            node.wait_for(
-                lambda m: m.status == ProximityArray.OK
-                and abs(pt.link(m, "ball_link").distance - 0.15) < 1e-6,
-                "the part of the service's scene",
-            )
+            node.wait_for_distance(0.15, "the part of the service's scene")
             self.assertEqual(set(requests), {4 | 16 | 32 | 64 | 128})
             late.send(late.box("part", (0, 0.3, 0), MOVE))
-            node.wait_for(lambda m: abs(pt.link(m, "ball_link").distance - 0.1) < 1e-6, "its move")
+            node.wait_for_distance(0.1, "its move")
             service.shutdown()
             # A publisher of the older layout: a service of the one md5sum refuses the other.
             late.stop()
             old = Publisher("/scenes/late", False)
             service, requests = old.serve("/late/get_planning_scene", old.box("part", (0, 0.45, 0)))
             old.send(old.box("other", (0, 0, 0.9)))
-            node.wait_for(
-                lambda m: m.status == ProximityArray.OK
-                and abs(pt.link(m, "ball_link").distance - 0.25) < 1e-6,
-                "the part of the older layout",
-            )
+            node.wait_for_distance(0.25, "the part of the older layout")
             self.assertTrue(requests)
             service.shutdown()
         finally:
@@ -402,7 +386,4 @@ class PlanningSceneTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("planning_scene_test")
-    rostest.rosrun("ist_proximity", "world_scenes", PlanningSceneTest, sys.argv)
+    pt.run("planning_scene_test", PlanningSceneTest)

@@ -153,7 +153,7 @@ class Repeater:
 class World:
     """The surroundings of a node: moving links in its /tf, a static camera, and a cloud."""
 
-    def __init__(self, namespace, X_BC=np.eye(4), static=True):
+    def __init__(self, namespace, X_BC=np.eye(4)):
         self.namespace = namespace
         self.poses = {}  # child frame: (parent, X or a function of the time in seconds)
         self.points = np.zeros((0, 3))  # in the camera's frame
@@ -164,7 +164,7 @@ class World:
             namespace + "/tf_static", TFMessage, queue_size=10, latch=True
         )
         self.cloud_publisher = rospy.Publisher(namespace + "/cloud", PointCloud2, queue_size=10)
-        if static:
+        if X_BC is not None:
             self.state_camera(X_BC)
         self._repeaters = []
 
@@ -202,6 +202,11 @@ class World:
     def start_clouds(self, rate=20):
         return self.repeat(rate, self.send_cloud)
 
+    def start_points(self, points, frame="base", rate=20):
+        """Clouds of points, or of those that a function gives."""
+        points_of = points if callable(points) else lambda: points
+        return self.repeat(rate, lambda: self.cloud_publisher.publish(cloud(points_of(), frame)))
+
     def repeat(self, rate, function):
         self._repeaters.append(Repeater(rate, function))
         return self._repeaters[-1]
@@ -217,14 +222,19 @@ class World:
 class NodeTest(unittest.TestCase):
     """A world and its nodes, in a namespace of the test's name; each message keeps what holds for all."""
 
-    BOX = transform((0, 0.8, 0))  # beside the ball at the origin
+    BALL = transform()
+    BOX = transform((0, 0.8, 0))  # beside the ball; None: tf has neither
+    CAMERA = np.eye(4)  # its pose in base; None: it is not static
     POINTS = np.zeros((0, 3))
+    MAX_DISTANCE = 1.0  # [m] of check_invariants(); None: it does not hold for all messages
 
     def setUp(self):
         self.namespace = "/" + self._testMethodName
-        self.world = World(self.namespace).stand(box=self.BOX)
+        self.world = World(self.namespace, self.CAMERA)
+        if self.BOX is not None:
+            self.world.stand(self.BALL, self.BOX)
         self.world.points = np.array(self.POINTS)
-        self.nodes = []
+        self.node, self.nodes = None, []
 
     def tearDown(self):
         self.world.stop()
@@ -237,9 +247,19 @@ class NodeTest(unittest.TestCase):
         return self.node
 
     def finish(self, node):
-        for message in node.messages:
-            check_invariants(self, message)
+        for message in node.messages if self.MAX_DISTANCE is not None else []:
+            check_invariants(self, message, self.MAX_DISTANCE)
         self.assertEqual(node.stop(), 0)
+
+
+def run(name, test, **node):
+    """The main program of a rostest: of a TestCase, or of one of several, by the program's first argument."""
+    import rostest
+
+    rospy.init_node(name, **node)
+    if isinstance(test, dict):
+        test = test[sys.argv[1]]
+    rostest.rosrun("ist_proximity", name, test, sys.argv)
 
 
 def find_program(package, name):
@@ -358,6 +378,23 @@ class ProximityNode:
             **kwargs
         )
 
+    def wait_for_unknown(self, status, text=""):
+        """Returns the first message from now on with this status and text: no link is known in it."""
+        message = self.wait_for_status(status, text)
+        assert all_unknown(message), message
+        return message
+
+    def wait_for_distance(self, distance, what, name="ball_link", within=1e-6, source=None):
+        """Returns the first OK message from now on in which a link is so far away, of the source."""
+
+        def is_it(message):
+            if message.status != ProximityArray.OK or not message.links:
+                return False
+            one = link(message, name)
+            return abs(one.distance - distance) < within and source in (None, one.source)
+
+        return self.wait_for(is_it, "%s, %g m away" % (what, distance))
+
     def diagnostic(self, status, key, default=""):
         """Returns a value of the newest diagnostics; `default` where there is none."""
         if status not in self.diagnostics:
@@ -368,10 +405,22 @@ class ProximityNode:
         """Waits for a condition on anything but a ProximityArray."""
         wait_until(condition, what, timeout, self._condition)
 
-    def reload(self):
-        service = rospy.ServiceProxy(self.name + "/reload_model", Trigger)
+    def wait_for_diagnostic(self, status, words="", level=None):
+        """Waits until the message of a status has these words, and it has the level."""
+
+        def is_so():
+            found = self.diagnostics.get(status)
+            return found and words in found.message and level in (None, found.level)
+
+        self.wait_until(is_so, "'%s' in the diagnostics of %s" % (words, status))
+
+    def service(self, name, kind):
+        service = rospy.ServiceProxy(self.name + "/" + name, kind)
         service.wait_for_service(TIMEOUT)
-        return service()
+        return service
+
+    def reload(self):
+        return self.service("reload_model", Trigger)()
 
     def log(self):
         self._log.seek(0)

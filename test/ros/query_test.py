@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
 """~query: truth for stated configurations, omitted joints, wrong requests, and the cycle beside it."""
 
-import sys
 import time
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -17,26 +15,17 @@ from ist_proximity.srv import QueryProximity
 NOW = {"turn": 0.3, "slide": 0.5}
 
 
-class QueryTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace)
-        self.points = np.random.default_rng(3).uniform(-1.5, 1.5, (400, 3)) + [0, 0, 0.8]
-        self.node = None
+class QueryTest(pt.NodeTest):
+    BOX, MAX_DISTANCE = None, 3.0
 
-    def tearDown(self):
-        self.world.stop()
-        if self.node:
-            self.assertEqual(self.node.stop(), 0)
+    def setUp(self):
+        super().setUp()
+        self.points = np.random.default_rng(3).uniform(-1.5, 1.5, (400, 3)) + [0, 0, 0.8]
 
     def start(self, **parameters):
-        parameters.setdefault("max_distance", 3.0)
-        parameters.setdefault("self_filter", False)
-        self.node = pt.ProximityNode(self.namespace, parameters, ARM)
-        self.service = rospy.ServiceProxy(self.node.name + "/query", QueryProximity)
-        self.service.wait_for_service(pt.TIMEOUT)
-        publisher = self.world.cloud_publisher
-        self.clouds = self.world.repeat(20, lambda: publisher.publish(pt.cloud(self.points, "base")))
+        super().start(ARM, max_distance=3.0, self_filter=False, **parameters)
+        self.service = self.node.service("query", QueryProximity)
+        self.clouds = self.world.start_points(lambda: self.points)
 
     def tf(self):
         """The robot as it is now."""
@@ -257,8 +246,7 @@ class QueryTest(unittest.TestCase):
         """A motion is not known while the root link's pose is not: NaN, neither free nor a crash."""
         self.start(fixed_frame="world")
         self.points = np.array([[0.0, 3.0, 0.5]])  # out of the robot's way
-        publisher = self.world.cloud_publisher
-        self.world.repeat(20, lambda: publisher.publish(pt.cloud(self.points, "world")))
+        self.world.start_points(self.points, "world")
         self.clouds.paused = True
         self.node.wait_for(
             lambda m: m.status == ProximityArray.NO_POSE and m.sources[0].status == 0, "the cloud"
@@ -327,9 +315,8 @@ class QueryTest(unittest.TestCase):
             self.assertIn(words, answer.message)
 
     def test_no_model(self):
-        self.node = pt.ProximityNode(self.namespace, {})
-        service = rospy.ServiceProxy(self.node.name + "/query", QueryProximity)
-        service.wait_for_service(pt.TIMEOUT)
+        super().start(None)
+        service = self.node.service("query", QueryProximity)
         self.node.wait_for_status(ProximityArray.MODEL_ERROR)
         answer = service(states=[JointState()])
         self.assertFalse(answer.success)
@@ -337,7 +324,4 @@ class QueryTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("query_test")
-    rostest.rosrun("ist_proximity", "query_test", QueryTest, sys.argv)
+    pt.run("query_test", QueryTest)

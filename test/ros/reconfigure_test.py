@@ -2,10 +2,7 @@
 """dynamic_reconfigure: live parameters change at once and stay within their ranges."""
 
 import os
-import sys
-import unittest
 
-import numpy as np
 import proximity_testing as pt
 import rospy
 import yaml
@@ -15,21 +12,16 @@ from proximity_testing import ProximityArray
 from std_msgs.msg import Float64
 
 
-class ReconfigureTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self.id().split(".")[-1]
-        self.world = pt.World(self.namespace)
-        self.world.stand(pt.transform(), pt.transform((0, 5, 0))).start_tf()
-        self.world.points = np.array([[0.3, 0.0, 0.0]])  # 0.2 m from the ball
-        self.world.start_clouds()
-        self.node = pt.ProximityNode(
-            self.namespace, {"query/margin": 0.02, "max_distance": 0.6}, pt.urdf()
-        )
-        self.node.wait_for_status(ProximityArray.OK)
+class ReconfigureTest(pt.NodeTest):
+    BOX, MAX_DISTANCE = pt.transform((0, 5, 0)), 0.6
+    POINTS = [[0.3, 0.0, 0.0]]  # 0.2 m from the ball
 
-    def tearDown(self):
-        self.node.stop()
-        self.world.stop()
+    def setUp(self):
+        super().setUp()
+        self.world.start_tf()
+        self.world.start_clouds()
+        self.start(max_distance=0.6, **{"query/margin": 0.02})
+        self.node.wait_for_status(ProximityArray.OK)
 
     def client(self, group):
         return Client(self.node.name + "/" + group, timeout=30)
@@ -109,10 +101,7 @@ class ReconfigureTest(unittest.TestCase):
         words = "~max_distance is 2, in use is 0.6"
         rospy.set_param(self.node.name + "/max_distance", 2.0)
         self.node.wait_until(lambda: words in self.node.log(), words)
-        self.node.wait_until(
-            lambda: words in getattr(self.node.diagnostics.get("query"), "message", ""),
-            "the diagnostics",
-        )
+        self.node.wait_for_diagnostic("query", words)
         self.assertIn("the node has to be restarted", self.node.log())
         rospy.set_param(self.node.name + "/query/margin", 0.03)  # has effect
         rospy.set_param(self.node.name + "/rate", 10.0)
@@ -234,7 +223,4 @@ class ReconfigureTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("reconfigure_test")
-    rostest.rosrun("ist_proximity", "reconfigure_test", ReconfigureTest, sys.argv)
+    pt.run("reconfigure_test", ReconfigureTest)

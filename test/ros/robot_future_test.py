@@ -1,16 +1,12 @@
 #!/usr/bin/env python3
 """What links can still reach until they stand: robot_future, and the separation distance of ~speed_scale."""
 
-import sys
-import unittest
 
 import numpy as np
 import proximity_testing as pt
-import rospy
 from ist_proximity.msg import SpeedScaleState
-from joint_states_test import ARM, joint_state
+from joint_states_test import ARM, JointStatesTest, joint_state
 from proximity_testing import LinkProximity, ProximityArray
-from sensor_msgs.msg import JointState
 
 # The arm with its camera at the column, which looks along x of `base`.
 STILL_CAMERA = ARM.replace(
@@ -23,30 +19,19 @@ LIMITED = ARM.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><limit velocity
 VOXEL = 0.02
 
 
-class RobotFutureTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.publisher = rospy.Publisher(
-            self.namespace + "/joint_states", JointState, queue_size=100
-        )
-        self.world = pt.World(self.namespace, static=False)  # the arm's URDF has the camera
-        self.node, self.scales = None, []
+class RobotFutureTest(pt.NodeTest):
+    CAMERA = BOX = None  # the arm's URDF has the camera
+    MAX_DISTANCE = 2.0
 
-    def tearDown(self):
-        self.world.stop()
-        for message in self.node.messages:
-            pt.check_invariants(self, message, max_distance=2.0)
-        self.assertEqual(self.node.stop(), 0)
+    def setUp(self):
+        super().setUp()
+        self.publisher = JointStatesTest.joint_publisher(self.namespace)
+        self.scales = []
 
     def start(self, urdf=ARM, **parameters):
-        parameters.update(pose_source="joint_states")
-        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
+        super().start(urdf, pose_source="joint_states", **parameters)
         self.node.subscribe("speed_scale_state", SpeedScaleState, self.scales.append)
         return self.node
-
-    def send_points(self, points):
-        cloud = np.array(points)
-        self.world.repeat(20, lambda: self.world.cloud_publisher.publish(pt.cloud(cloud, "base")))
 
     def send_joints(self, q, velocities=()):
         """Publishes what the arguments hold, which may change."""
@@ -58,7 +43,7 @@ class RobotFutureTest(unittest.TestCase):
         """What links can still sweep comes off their bounds; without velocities it is not known."""
         deceleration = {"default": 0.5, "slide": 2.0}
         node = self.start(max_distance=3.0, joint_deceleration=deceleration)
-        self.send_points([[0.6, 0.6, 0.6]])
+        self.world.start_points([[0.6, 0.6, 0.6]])
         q, velocities = {"turn": 0.3, "slide": 0.5}, [-0.4, 0.6]
         self.send_joints(q, velocities)
         message = node.wait_for_status(ProximityArray.OK)
@@ -152,7 +137,7 @@ class RobotFutureTest(unittest.TestCase):
             speed_scale={"separation": {"enabled": True, "reaction_time": reaction}},
         )
         away = 0.5 + 0.1 + 1.2  # from the column's axis, by where the ball is
-        self.send_points([[away * np.cos(turn), away * np.sin(turn), 0.5]])
+        self.world.start_points([[away * np.cos(turn), away * np.sin(turn), 0.5]])
         self.send_joints({"turn": turn, "slide": 0.5}, [0.0, 0.0])
         node.wait_for_status(ProximityArray.OK)
         lever = np.hypot(0.5 + 0.1, 0.1)
@@ -181,7 +166,4 @@ class RobotFutureTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("robot_future_test")
-    rostest.rosrun("ist_proximity", "robot_future_test", RobotFutureTest, sys.argv)
+    pt.run("robot_future_test", RobotFutureTest)

@@ -8,7 +8,7 @@ import time
 import unittest
 
 import numpy as np
-import rospy
+import proximity_testing as pt
 from geometry_msgs.msg import Pose
 from planning_scene_messages import planning_scene_types
 
@@ -262,7 +262,4 @@ def place_of_origin(octomap):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("scene_state_test")
-    rostest.rosrun("ist_proximity", "world_scene_state", SceneStateTest, sys.argv)
+    pt.run("scene_state_test", SceneStateTest)

@@ -6,7 +6,6 @@ newest transform would leave every point of the ball in the cloud as an obstacle
 obstacle that is where the ball has come to.
 """
 
-import sys
 
 import numpy as np
 import proximity_testing as pt
@@ -122,12 +121,9 @@ class SelfFilterTest(pt.NodeTest):
             lambda m: m.status == ProximityArray.OK and counts(m) == (len(BALL), 1),
             "the ball's points dropped, and the obstacle kept",
         )
-        begin = len(self.node.messages)
-        self.node.wait_for(lambda m: len(self.node.messages) > begin + 60, "60 more answers")
-        for message in self.node.messages[begin:]:
+        for message in self.node.next_messages(60):
             if message.status == ProximityArray.OK:
                 self.assertEqual(counts(message), (len(BALL), 1))
-
 
     def check_filter(self, case, robot, srdf="", **parameters):
         """Starts a node, and waits until so many of four points are the robot's."""
@@ -205,7 +201,4 @@ class SelfFilterTest(pt.NodeTest):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("self_filter_test", anonymous=True)
-    rostest.rosrun("ist_proximity", "self_filter", SelfFilterTest, sys.argv)
+    pt.run("self_filter_test", SelfFilterTest, anonymous=True)

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """~self_proximity: truth, contact, pairs that are left out, and what is missing."""
 
-import sys
 import time
 import unittest
 
@@ -57,11 +56,7 @@ class SelfProximityTest(unittest.TestCase):
         for slide in (0.1, 0.4, 0.0):
             self.q = {"turn": 0.7, "slide": slide}
             truth = 2.5 * slide + 0.25  # between the ball and the box that goes the other way
-            message = node.wait_for(
-                lambda m: m.status == ProximityArray.OK
-                and abs(pt.link(m, "ball_link").distance - truth) < 0.0011,
-                "a distance of %.3f m" % truth,
-            )
+            message = node.wait_for_distance(truth, "the box", within=0.0011)
             self.assertEqual(message.header.frame_id, "base")
             self.assertEqual(message.sources, [])
             for name, other in (("ball_link", "box_link"), ("box_link", "ball_link")):
@@ -105,8 +100,7 @@ class SelfProximityTest(unittest.TestCase):
         np.testing.assert_allclose(forces[0], -forces[1], atol=1e-9)
 
         self.joints.paused = True
-        message = node.wait_for_status(ProximityArray.NO_POSE, "'turn'")
-        self.assertTrue(pt.all_unknown(message))
+        node.wait_for_unknown(ProximityArray.NO_POSE, "'turn'")
 
     def test_joint_that_is_late(self):
         """What a joint between the links may have moved since its sample comes off the bounds; a
@@ -151,8 +145,7 @@ class SelfProximityTest(unittest.TestCase):
 
     def link_pairs(self, until=lambda answer: answer.success, **kwargs):
         """The answer of ~link_pairs, which comes a little after the model."""
-        service = rospy.ServiceProxy(self.node.name + "/link_pairs", ListLinkPairs)
-        service.wait_for_service(pt.TIMEOUT)
+        service = self.node.service("link_pairs", ListLinkPairs)
         end = time.monotonic() + pt.TIMEOUT
         while True:
             answer = service(**kwargs)
@@ -193,8 +186,7 @@ class SelfProximityTest(unittest.TestCase):
         node = self.start("pushed", **{"self_collision/in_minimum": True, "self_filter": False})
         self.q = {"turn": 0.7, "slide": 0.0}
         world = pt.World(self.namespace)
-        points = np.array([[9.0, 9.0, 9.0]])
-        world.repeat(20, lambda: world.cloud_publisher.publish(pt.cloud(points, "base")))
+        world.start_points([[9.0, 9.0, 9.0]])
         efforts = []
         subscriber = rospy.Subscriber(node.name + "/joint_repulsion", JointRepulsion, efforts.append)
         try:
@@ -217,10 +209,8 @@ class SelfProximityTest(unittest.TestCase):
         """A tool that is in the box with all joints at zero is far from it elsewhere, and watched."""
         node = self.start("carried")
         self.q["slide"] = 0.5
-        is_far = lambda gap: lambda m: abs(pt.link(m, "ball_link").distance - gap) < 0.0011  # noqa: E731
-        node.wait_for(is_far(1.5), "the links without the tool")
-        attach = rospy.ServiceProxy(node.name + "/attach_object", AttachObject)
-        attach.wait_for_service(pt.TIMEOUT)
+        node.wait_for_distance(1.5, "the box", within=0.0011)
+        attach = node.service("attach_object", AttachObject)
         answer = attach(
             name="tool",
             link="ball_link",
@@ -229,7 +219,7 @@ class SelfProximityTest(unittest.TestCase):
             pose=Pose(Point(-0.3, 0.0, 0.0), Quaternion(w=1.0)),
         )
         self.assertTrue(answer.success, answer.message)
-        message = node.wait_for(is_far(1.2), "the distance of the tool")
+        message = node.wait_for_distance(1.2, "the box from the tool", within=0.0011)
         self.assertLessEqual(pt.link(message, "ball_link").lower_bound, 1.2 + 1e-6)
         self.q["slide"] = 0.0
         node.wait_for(lambda m: pt.states(m) == [LinkProximity.CONTACT] * 2, "contact of tool and box")
@@ -239,13 +229,11 @@ class SelfProximityTest(unittest.TestCase):
         node = self.start("minimum", **{"self_collision/in_minimum": True, "self_filter": False})
         self.q["slide"] = 0.5
         world = pt.World(self.namespace)
-        points = np.array([[9.0, 9.0, 9.0]])
-        world.repeat(100, lambda: world.cloud_publisher.publish(pt.cloud(points, "base")))
+        world.start_points([[9.0, 9.0, 9.0]], rate=100)
         minima = []
         subscriber = rospy.Subscriber(node.name + "/min_distance", Float64, lambda m: minima.append(m.data))
-        attach = rospy.ServiceProxy(node.name + "/attach_object", AttachObject)
-        detach = rospy.ServiceProxy(node.name + "/detach_object", DetachObject)
-        attach.wait_for_service(pt.TIMEOUT)
+        attach = node.service("attach_object", AttachObject)
+        detach = node.service("detach_object", DetachObject)
         pose = Pose(Point(-0.3, 0.0, 0.0), Quaternion(w=1.0))
         tool = {"name": "tool", "link": "ball_link", "shape": AttachObjectRequest.SPHERE}
         firsts = []
@@ -279,7 +267,4 @@ class SelfProximityTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("self_proximity_test")
-    rostest.rosrun("ist_proximity", "self_proximity_test", SelfProximityTest, sys.argv)
+    pt.run("self_proximity_test", SelfProximityTest)

@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
 """~speed_scale and ~min_distance: which links count in them, and what they say."""
 
-import sys
 import time
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -35,22 +33,11 @@ TWO_JOINTS = """<robot name="two_joints">
 </robot>"""
 
 
-class SpeedScaleTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace)
-        self.nodes, self.smallest, self.scales = [], [], []
-
-    def tearDown(self):
-        self.world.stop()
-        for node in self.nodes:
-            for message in node.messages:
-                pt.check_invariants(self, message)
-            self.assertEqual(node.stop(), 0)
+class SpeedScaleTest(pt.NodeTest):
+    BOX = None
 
     def start(self, urdf, wait=True, **parameters):
-        self.nodes.append(pt.ProximityNode(self.namespace, parameters, urdf))
-        node = self.nodes[-1]
+        node = super().start(urdf, **parameters)
         self.smallest, self.scales = [], []
         node.subscribe("min_distance", Float64, lambda m: self.smallest.append(m.data))
         node.subscribe("speed_scale_state", SpeedScaleState, self.scales.append)
@@ -217,7 +204,4 @@ class SpeedScaleTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("speed_scale_test")
-    rostest.rosrun("ist_proximity", "speed_scale_test", SpeedScaleTest, sys.argv)
+    pt.run("speed_scale_test", SpeedScaleTest)

@@ -2,7 +2,6 @@
 """Status, text and states when clouds or poses are missing, late, or come back."""
 
 import collections
-import sys
 
 import numpy as np
 import proximity_testing as pt
@@ -50,10 +49,7 @@ class StatusTest(pt.NodeTest):
             if m.status == ProximityArray.OK:
                 self.assertLess((m.header.stamp - m.cloud_stamp).to_sec(), 0.5)
         node.wait_until(lambda: np.isnan(smallest[-1]), "NaN on ~min_distance")
-        node.wait_until(
-            lambda: "input cloud" in node.diagnostics and node.diagnostics["input cloud"].level == 3,
-            "STALE in the diagnostics",
-        )
+        node.wait_for_diagnostic("input cloud", level=3)  # STALE
 
         clouds.paused = False
         message = node.wait_for_status(ProximityArray.OK)
@@ -76,8 +72,7 @@ class StatusTest(pt.NodeTest):
 
         for offset, text in ((-5.0, "old"), (3600.0, "in the future")):
             repeater = self.world.repeat(20, lambda offset=offset: send(offset))
-            message = node.wait_for_status(ProximityArray.STALE_CLOUD, text)
-            self.assertTrue(pt.all_unknown(message))
+            node.wait_for_unknown(ProximityArray.STALE_CLOUD, text)
             node.wait_for_status(ProximityArray.STALE_CLOUD, "clocks of sensor and node")
             repeater.stop()
         # A cloud of the far future does not shut out those of now.
@@ -102,8 +97,7 @@ class StatusTest(pt.NodeTest):
     def test_no_pose(self):
         node = self.start()
         self.world.start_clouds()
-        message = node.wait_for_status(ProximityArray.NO_POSE, "ball_link")
-        self.assertTrue(pt.all_unknown(message))
+        message = node.wait_for_unknown(ProximityArray.NO_POSE, "ball_link")
         self.assertIn("base", message.status_text)
 
         # One link: the other goes on.
@@ -121,18 +115,14 @@ class StatusTest(pt.NodeTest):
 
         self.world.stand(box=self.BOX)
         node.wait_for_status(ProximityArray.OK)
-        node.wait_until(
-            lambda: "pose" in node.diagnostics and node.diagnostics["pose"].level == 0,
-            "pose diagnostics OK",
-        )
+        node.wait_for_diagnostic("pose", level=0)
 
     def test_transforms_of_the_future_beside_good_ones(self):
         """They are told, whoever else gives their frame a pose, and are not used."""
         node = self.start()
         self.world.poses["wrist"] = ("base", pt.transform())
         self.world.start_tf()
-        publisher = self.world.cloud_publisher
-        self.world.repeat(20, lambda: publisher.publish(pt.cloud(POINT, "wrist")))
+        self.world.start_points(POINT, "wrist")
         for frame, begins in (("ball_link", "the"), ("wrist", "source 'cloud': the")):
             node.wait_for_status(ProximityArray.OK)
 
@@ -203,7 +193,4 @@ class StatusTest(pt.NodeTest):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("status_test")
-    rostest.rosrun("ist_proximity", "status_test", StatusTest, sys.argv)
+    pt.run("status_test", StatusTest)

@@ -2,10 +2,8 @@
 """~trajectory: first contact, clearance and cancelling, and what cannot be watched."""
 
 import subprocess
-import sys
 import threading
 import time
-import unittest
 
 import genpy.dynamic
 import numpy as np
@@ -65,19 +63,16 @@ def dynamic_message(kind, definition):
     return genpy.dynamic.generate_dynamic(kind, text)[kind]()
 
 
-class TrajectoryTest(unittest.TestCase):
+class TrajectoryTest(pt.NodeTest):
+    CAMERA = BOX = MAX_DISTANCE = None
+
     def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace, static=False)
+        super().setUp()
         self.points = np.array([[POINT, 0.0, 0.5]])
         self.heard, self.cancelled = [], []
         self.condition = threading.Condition()
         self.start_time = rospy.Time.now() + rospy.Duration(1e6)
         self.at_rest = self.turn = self.speed = 0.0
-
-    def tearDown(self):
-        self.world.stop()
-        self.assertEqual(self.node.stop(), 0)
 
     def slide(self):
         """Where the robot is: it follows its trajectory."""
@@ -90,8 +85,7 @@ class TrajectoryTest(unittest.TestCase):
         return message
 
     def start(self, urdf=ARM, **parameters):
-        parameters.update(pose_source="joint_states", self_filter=False)
-        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
+        super().start(urdf, pose_source="joint_states", self_filter=False, **parameters)
         self.node.subscribe("trajectory_clearance", TrajectoryClearance, self.hear)
         cancel = self.namespace + "/arm/cancel"
         self.subscriber = rospy.Subscriber(
@@ -100,8 +94,7 @@ class TrajectoryTest(unittest.TestCase):
         self.sender = rospy.Publisher(self.node.name + "/trajectory", JointTrajectory, queue_size=1)
         joints = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
         self.world.repeat(100, lambda: joints.publish(self.joint_state()))
-        publisher = self.world.cloud_publisher
-        self.world.repeat(20, lambda: publisher.publish(pt.cloud(self.points, "base")))
+        self.world.start_points(lambda: self.points)
         self.node.wait_for_status(0)
         pt.wait_until(lambda: self.sender.get_num_connections() > 0, "the node to listen")
 
@@ -198,9 +191,9 @@ class TrajectoryTest(unittest.TestCase):
     def test_zones_and_ignored_links_count_as_in_the_cycle(self):
         self.points = np.array([[POINT, 0.0, 0.5], [0.0, 0.9, 0.5]])
         self.start(trajectory={"tolerance": 1.0})
-        service = lambda name, kind: rospy.ServiceProxy(self.node.name + "/" + name, kind)  # noqa: E731
-        ignore, remove = service("ignore_links", IgnoreLinks), service("remove_zone", RemoveZone)
-        set_zone = service("set_zone", SetZone)
+        ignore = self.node.service("ignore_links", IgnoreLinks)
+        remove = self.node.service("remove_zone", RemoveZone)
+        set_zone = self.node.service("set_zone", SetZone)
         pose = Pose(orientation=Quaternion(w=1.0))
         pose.position.x, pose.position.z = POINT, 0.5
         zone = SetZoneRequest(
@@ -440,7 +433,4 @@ class TrajectoryTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("trajectory_test")
-    rostest.rosrun("ist_proximity", "trajectory", TrajectoryTest, sys.argv)
+    pt.run("trajectory_test", TrajectoryTest)

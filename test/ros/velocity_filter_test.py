@@ -2,10 +2,8 @@
 """ist_proximity/VelocityFilter in the command path: a ball on two slides, a wall, and every fault."""
 
 import subprocess
-import sys
 import tempfile
 import threading
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -100,12 +98,12 @@ class Filter:
         return self.process.wait(pt.TIMEOUT)
 
 
-class VelocityFilterTest(unittest.TestCase):
+class VelocityFilterTest(pt.NodeTest):
+    BOX, POINTS = None, wall()
+
     def setUp(self):
-        self.namespace = "/" + self._testMethodName
+        super().setUp()
         self.filter = None
-        self.world = pt.World(self.namespace)
-        self.world.points = wall()
         self.clouds = self.world.start_clouds()
         self.q, self.velocity = np.zeros(2), np.zeros(2)
         self.lock = threading.Lock()
@@ -121,23 +119,19 @@ class VelocityFilterTest(unittest.TestCase):
             robot = SLIDES.replace('"0 1 0"', '"1 0 0"').replace("0.4", "2")
         if "base" in self._testMethodName:
             robot = robot.replace("</robot>", BASE)
-        self.node = pt.ProximityNode(
-            self.namespace,
-            {
-                "pose_source": "joint_states",
-                "self_filter": has_padding,
-                "self_filter_padding": PADDING,
-                "self_collision/enabled": has_post,
-            },
+        super().start(
             robot.replace("</robot>", POST) if has_post else robot,
+            pose_source="joint_states",
+            self_filter=has_padding,
+            self_filter_padding=PADDING,
+            **{"self_collision/enabled": has_post},
         )
         self.node.wait_for_status(ProximityArray.OK)
 
     def tearDown(self):
-        self.world.stop()
         if self.filter:
             self.filter.stop()
-        self.assertEqual(self.node.stop(), 0)
+        super().tearDown()
 
     def move(self):
         """One period of the robot, which follows the last velocity that it was given."""
@@ -291,7 +285,7 @@ class VelocityFilterTest(unittest.TestCase):
         self.robot.function = lambda: self.send_joints(self.q)
         self.start(0.2, 0.0)
         self.wait_for(FilterState.LIMITED)
-        ignore = rospy.ServiceProxy(self.node.name + "/ignore_links", IgnoreLinks)
+        ignore = self.node.service("ignore_links", IgnoreLinks)
         self.assertTrue(ignore(["ball"], 2.0).success)
         free = self.wait_for(FilterState.FREE)
         self.assertEqual(free.ignored_links, ["ball"])
@@ -656,7 +650,4 @@ class VelocityFilterTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("velocity_filter_test")
-    rostest.rosrun("ist_proximity", "velocity_filter_test", VelocityFilterTest, sys.argv)
+    pt.run("velocity_filter_test", VelocityFilterTest)

@@ -3,7 +3,6 @@
 
 import math
 import os
-import sys
 import tempfile
 import unittest
 
@@ -264,8 +263,7 @@ class WorldTest(unittest.TestCase):
 
     def test_6_query_service(self):
         self.is_at_table()
-        service = rospy.ServiceProxy("/known/proximity/query", QueryProximity)
-        service.wait_for_service(pt.TIMEOUT)
+        service = self.node.service("query", QueryProximity)
         answer = service(states=[JointState(), JointState()], times=[0.0, 1.0])
         self.assertTrue(answer.success, answer.message)
         distances = [pt.link(result, "ball_link").distance for result in answer.results]
@@ -290,128 +288,80 @@ class WorldTest(unittest.TestCase):
         self.is_at_table()
 
 
-class OtherRobotTest(unittest.TestCase):
+class OtherRobotTest(pt.NodeTest):
     """Another robot, by its joint states and by tf."""
 
+    BOX = pt.transform((2, 0, 0))
+
+    def start(self, **sources):
+        self.world.start_tf()
+        return super().start(sources=sources, links=["ball_link"])
+
     def run_with(self, robot, move, stop):
-        namespace = "/with_%s" % move.__name__
-        world = pt.World(namespace).stand()
-        rospy.set_param(namespace + "/other/robot_description", OTHER)
+        rospy.set_param(self.namespace + "/other/robot_description", OTHER)
         source = {"type": "world", "robot": dict(robot, description="other/robot_description")}
-        world.poses["other/rail"] = ("base", pt.transform((1, 0, 0)))
-        world.start_tf()
-        node = pt.ProximityNode(
-            namespace, {"sources": {"other": source}, "links": ["ball_link"]}, pt.urdf()
-        )
-        try:
-            node.wait_for_status(ProximityArray.NO_CLOUD, "head")
-            mover = world.repeat(50, lambda: move(world, namespace, -0.4))
-            node.wait_for(
-                lambda m: m.status == ProximityArray.OK
-                and abs(pt.link(m, "ball_link").distance - 0.4) < 1e-3
-                and pt.link(m, "ball_link").source == "other",
-                "the other robot's head",
-            )
-            mover.function = lambda: move(world, namespace, -0.6)
-            node.wait_for(
-                lambda m: abs(pt.link(m, "ball_link").distance - 0.2) < 1e-3, "its motion"
-            )
-            mover.paused = True
-            stop(world)
-            old = node.wait_for_status(ProximityArray.NO_CLOUD, "head")
-            self.assertEqual(pt.link(old, "ball_link").state, LinkProximity.UNKNOWN)
-        finally:
-            node.stop()
-            world.stop()
+        self.world.poses["other/rail"] = ("base", pt.transform((1, 0, 0)))
+        node = self.start(other=source)
+        node.wait_for_status(ProximityArray.NO_CLOUD, "head")
+        mover = self.world.repeat(50, lambda: move(-0.4))
+        node.wait_for_distance(0.4, "the other robot's head", within=1e-3, source="other")
+        mover.function = lambda: move(-0.6)
+        node.wait_for_distance(0.2, "its motion", within=1e-3)
+        mover.paused = True
+        stop()
+        old = node.wait_for_status(ProximityArray.NO_CLOUD, "head")
+        self.assertEqual(pt.link(old, "ball_link").state, LinkProximity.UNKNOWN)
 
     def test_a_name_that_is_stated_twice(self):
         """A table of the parameters and one of the file: neither vanishes in silence."""
         path = os.path.join(tempfile.mkdtemp(), "cell.scene")
         with open(path, "w") as file:
             file.write(SCENE)
-        world = pt.World("/twice").stand()
-        world.start_tf()
         shelf = {"shape": "box", "size": [0.2, 0.2, 0.2], "position": [0.5, 0, 0]}
         cell = {"type": "world", "file": path, "objects": {"shelf": shelf}}
-        node = pt.ProximityNode("/twice", {"sources": {"cell": cell}, "links": ["ball_link"]}, pt.urdf())
-        try:
-            told = node.wait_for_status(ProximityArray.NO_CLOUD, "'shelf' is stated twice")
-            self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
-        finally:
-            node.stop()
-            world.stop()
+        told = self.start(cell=cell).wait_for_status(ProximityArray.NO_CLOUD, "'shelf' is stated twice")
+        self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
 
     def test_what_can_be_placed_is_left_of_an_optional_world(self):
         """An object whose frame is not known takes no other one with it."""
-        world = pt.World("/optional").stand()
-        world.points = [[0, 0, 1.0]]
-        world.poses["carriage"] = ("base", pt.transform((0, 0.35, 0)))
-        world.start_tf()
-        world.start_clouds()
+        self.world.points = [[0, 0, 1.0]]
+        self.world.poses["carriage"] = ("base", pt.transform((0, 0.35, 0)))
+        self.world.start_clouds()
         box = {"shape": "box", "size": [0.2, 0.2, 0.2], "position": [0.5, 0, 0]}
         slider = {"shape": "sphere", "radius": 0.1, "frame_id": "carriage"}
         cell = {"type": "world", "required": False, "objects": {"box": box, "slider": slider}}
-        sources = {"camera": {"topic": "cloud"}, "cell": cell}
-        node = pt.ProximityNode("/optional", {"sources": sources, "links": ["ball_link"]}, pt.urdf())
+        node = self.start(camera={"topic": "cloud"}, cell=cell)
 
-        def wait_for_distance(distance, status):
-            return node.wait_for(
-                lambda m: m.status == status
-                and abs(pt.link(m, "ball_link").distance - distance) < 1e-6,
-                "%g m" % distance,
-            )
-
-        try:
-            wait_for_distance(0.15, ProximityArray.OK)
-            begin = len(node.messages)
-            del world.poses["carriage"]
-            left = wait_for_distance(0.3, ProximityArray.OK)
-            told = next(source for source in left.sources if source.name == "cell")
-            self.assertEqual(told.status, ProximityArray.NO_CLOUD)
-            node.wait_until(
-                lambda: "input cell" in node.diagnostics
-                and "some of it is left out" in node.diagnostics["input cell"].message,
-                "what is left out",
-            )
-            for message in node.messages[begin:]:
-                self.assertLessEqual(pt.link(message, "ball_link").lower_bound, 0.3)
-            world.poses["carriage"] = ("base", pt.transform((0, 0.35, 0)))
-            wait_for_distance(0.15, ProximityArray.OK)
-        finally:
-            node.stop()
-            world.stop()
+        node.wait_for_distance(0.15, "the slider")
+        begin = len(node.messages)
+        del self.world.poses["carriage"]
+        left = node.wait_for_distance(0.3, "the box")
+        told = next(source for source in left.sources if source.name == "cell")
+        self.assertEqual(told.status, ProximityArray.NO_CLOUD)
+        node.wait_for_diagnostic("input cell", "some of it is left out")
+        for message in node.messages[begin:]:
+            self.assertLessEqual(pt.link(message, "ball_link").lower_bound, 0.3)
+        self.world.poses["carriage"] = ("base", pt.transform((0, 0.35, 0)))
+        node.wait_for_distance(0.15, "the slider again")
 
     def test_joint_states(self):
-        publishers = {}
+        publisher = rospy.Publisher(self.namespace + "/other/joint_states", JointState, queue_size=10)
 
-        def by_joint_states(_, namespace, q):
-            if namespace not in publishers:
-                publishers[namespace] = rospy.Publisher(
-                    namespace + "/other/joint_states", JointState, queue_size=10
-                )
+        def move(q):
             state = JointState(name=["slide"], position=[q])
             state.header.stamp = rospy.Time.now()
-            publishers[namespace].publish(state)
+            publisher.publish(state)
 
         self.run_with(
-            {"joint_states": "other/joint_states", "tf_prefix": "other/"},
-            by_joint_states,
-            lambda world: None,
+            {"joint_states": "other/joint_states", "tf_prefix": "other/"}, move, lambda: None
         )
 
     def test_tf(self):
-        def by_tf(world, _, q):
-            world.poses["other/head"] = ("other/rail", pt.transform((q, 0, 0)))
+        def move(q):
+            self.world.poses["other/head"] = ("other/rail", pt.transform((q, 0, 0)))
 
-        self.run_with(
-            {"tf_prefix": "other/"}, by_tf, lambda world: world.poses.pop("other/head")
-        )
+        self.run_with({"tf_prefix": "other/"}, move, lambda: self.world.poses.pop("other/head"))
 
 
 if __name__ == "__main__":
-    import rostest
-
-    kinds = {"objects": WorldTest, "robot": OtherRobotTest}
-    suite = sys.argv[1]
-    rospy.init_node("world_test")
-    rostest.rosrun("ist_proximity", "world_" + suite, kinds[suite], sys.argv)
+    pt.run("world_test", {"objects": WorldTest, "robot": OtherRobotTest})
