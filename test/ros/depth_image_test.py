@@ -3,16 +3,13 @@
 
 import contextlib
 import re
-import sys
-import unittest
 
 import numpy as np
 import proximity_testing as pt
 import rospy
-from proximity_testing import LinkProximity, ProximityArray
+from proximity_testing import ProximityArray
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 
-FAR_BOX = pt.transform((0, 0.8, 0))
 X_BASE_CAMERA = pt.transform((0.0, 0.0, -0.9), axis=(0, 0, 1), angle=0.2)
 WIDTH, HEIGHT = 64, 48
 FOCAL_LENGTH, CX, CY = 60.0, 31.0, 24.5
@@ -60,48 +57,31 @@ def malformed(members):
     return message
 
 
+# check_depth_image() and check_camera() have tests of their own.
 MALFORMED = [
     ({"encoding": "rgb8"}, "encoding is 'rgb8'"),
-    ({"step": 127}, "step is 127"),
-    ({"data": b"1234"}, "data holds 4 bytes"),
-    ({"width": 0}, "width 0"),
     ({"width": 63}, "has 63 x 48 pixels, its camera"),
-    ({"height": 4000000000}, "data holds 6144 bytes"),
 ]
 P = camera_info().P
 BAD_CAMERAS = [
     ({"P": [0.0] * 12}, "not calibrated"),
-    ({"P": [0.0] + P[1:]}, "P[0] is 0"),
-    ({"P": [float("nan")] + P[1:]}, "P[0] is nan"),
-    ({"P": P[:11] + [-9.0]}, "P[11] is -9"),
-    ({"width": 0}, "width is 0"),
     ({"width": 640}, "its camera (width and height"),
 ]
 
 
-class DepthImageTest(unittest.TestCase):
+class DepthImageTest(pt.NodeTest):
+    CAMERA = X_BASE_CAMERA
+
     def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace, X_BASE_CAMERA).stand(box=FAR_BOX)
+        super().setUp()
         self.images = rospy.Publisher(self.namespace + "/depth/image", Image, queue_size=10)
         self.infos = {}
         self.info = camera_info()
-        self.node = None
 
-    def tearDown(self):
-        self.world.stop()
-        for publisher in [self.images, *self.infos.values()]:
-            publisher.unregister()
-        for message in self.node.messages:
-            pt.check_invariants(self, message)
-        self.assertEqual(self.node.stop(), 0)
-
-    def start(self, topic="depth/camera_info", **source):
+    def start_camera(self, topic="depth/camera_info", **source):
         source = {"topic": "depth/image", "type": "sensor_msgs/Image", **source}
         self.infos[topic] = rospy.Publisher(self.namespace + "/" + topic, CameraInfo, queue_size=10)
-        self.node = pt.ProximityNode(
-            self.namespace, {"sources": {"depth": source}, "query/tolerance": 0.0}, pt.urdf()
-        )
+        self.start(sources={"depth": source}, **{"query/tolerance": 0.0})
         self.world.start_tf()
         if self.info is not None:
             self.world.repeat(10, lambda: self.infos[topic].publish(self.info))
@@ -121,7 +101,7 @@ class DepthImageTest(unittest.TestCase):
             answer = self.node.wait_for(
                 lambda m: m.status == 0 and m.cloud_stamp > begin, "the wall"
             )
-        for name, link_pose in (("ball_link", pt.transform()), ("box_link", FAR_BOX)):
+        for name, link_pose in (("ball_link", self.BALL), ("box_link", self.BOX)):
             truth = pt.DISTANCE[name](pt.apply(pt.inverse(link_pose), seen)).min()
             self.assertAlmostEqual(pt.link(answer, name).distance, truth, 5)
             self.assertEqual(pt.link(answer, name).source, "depth")
@@ -129,7 +109,7 @@ class DepthImageTest(unittest.TestCase):
         self.assertEqual(answer.sources[0].points_used, len(seen))
 
     def test_distances_and_silence(self):
-        self.start()
+        self.start_camera()
         for format in (
             {},
             {"encoding": "mono16", "big": True, "padding": 3},
@@ -138,27 +118,12 @@ class DepthImageTest(unittest.TestCase):
         ):
             with self.subTest(format):
                 self.check_wall(**format)
-        message = self.node.wait_for_status(ProximityArray.STALE_CLOUD, "the newest image is")
-        self.assertTrue(pt.all_unknown(message))
-        # A blind camera knows nothing; one that measured that nothing is in range does.
-        for blind, format in ((0.0, {}), (np.nan, {"encoding": "32FC1"})):
-            with self.stream(lambda b=blind, f=format: image(np.full((HEIGHT, WIDTH), b), **f)):
-                message = self.node.wait_for_status(
-                    ProximityArray.NO_CLOUD, "every point of the newest image is NaN"
-                )
-                self.assertTrue(pt.all_unknown(message))
-            self.check_wall()
-        far = np.full((HEIGHT, WIDTH), np.inf)
-        with self.stream(lambda: image(far, encoding="32FC1")):
-            message = self.node.wait_for(
-                lambda m: m.status == 0 and m.sources[0].points_used == 0, "nothing in range"
-            )
-        self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
+        self.node.wait_for_unknown(ProximityArray.STALE_CLOUD, "the newest image is")
 
     def test_baseline_and_unit(self):
         """Gazebo's hackBaseline, and a camera that counts tenths of a millimetre."""
         self.info = camera_info(P=P[:3] + [-0.07 * FOCAL_LENGTH] + P[4:])
-        self.start(depth_scale=1e-4)
+        self.start_camera(depth_scale=1e-4)
         tenths = 10 * depths()
         seen = pt.apply(X_BASE_CAMERA, points(depths()) + [0.07, 0, 0])
         with self.stream(lambda: image(tenths)):
@@ -167,7 +132,7 @@ class DepthImageTest(unittest.TestCase):
         self.assertAlmostEqual(pt.link(answer, "ball_link").distance, truth, 5)
 
     def test_malformed(self):
-        self.start()
+        self.start_camera()
         self.check_wall()
         for members, words in MALFORMED:
             with self.subTest(words), self.stream(lambda m=members: malformed(m)):
@@ -193,7 +158,7 @@ class DepthImageTest(unittest.TestCase):
     def test_camera_info(self):
         """Without a CameraInfo nothing is known, and the text says where one is expected."""
         self.info = None
-        self.start("elsewhere/info", camera_info="elsewhere/info")
+        self.start_camera("elsewhere/info", camera_info="elsewhere/info")
         with self.stream(lambda: image(depths())):
             message = self.node.wait_for_status(
                 ProximityArray.NO_CLOUD, self.namespace + "/elsewhere/info; set ~sources/depth/"
@@ -215,7 +180,7 @@ class DepthImageTest(unittest.TestCase):
 
     def test_extent(self):
         """Noise, footprint and latency: the bound is that of a sphere about each point."""
-        self.start(
+        self.start_camera(
             noise={"a": 0.001, "b": 0.004, "calibration": 0.003},
             footprint="camera",
             latency=0.02,
@@ -226,7 +191,7 @@ class DepthImageTest(unittest.TestCase):
         self.assertGreater(radius.min(), 0.02)
         with self.stream(lambda: image(depths())):
             answer = self.node.wait_for_status(ProximityArray.OK)
-        for name, link_pose in (("ball_link", pt.transform()), ("box_link", FAR_BOX)):
+        for name, link_pose in (("ball_link", self.BALL), ("box_link", self.BOX)):
             one = pt.link(answer, name)
             distances = pt.DISTANCE[name](pt.apply(pt.inverse(link_pose), seen))
             truth = (distances - radius).min()
@@ -238,21 +203,19 @@ class DepthImageTest(unittest.TestCase):
     def test_footprint_of_no_camera(self):
         """A cloud that is no image has no angle between pixels: it is not used, and why is said."""
         clouds = rospy.Publisher(self.namespace + "/points", PointCloud2, queue_size=1)
-        source = {"topic": "points", "footprint": "camera", "noise": "kinect_v1"}
-        self.node = pt.ProximityNode(self.namespace, {"sources": {"c": source}}, pt.urdf())
+        self.start(sources={"c": {"topic": "points", "footprint": "camera", "noise": "kinect_v1"}})
         self.world.start_tf()
         self.world.repeat(20, lambda: clouds.publish(pt.cloud(points(depths()))))
         message = self.node.wait_for(
             lambda m: "the footprint of a point is asked for" in m.status_text, "the reason"
         )
         self.assertTrue(pt.all_unknown(message))
-        clouds.unregister()
 
     def test_wrong_topic(self):
         """A topic of another type is named; else the topics that a source could have."""
         other = rospy.Publisher(self.namespace + "/points", PointCloud2, queue_size=1)
-        self.start(topic="depth/camera_info")
-        self.node.stop()
+        info = rospy.Publisher(self.namespace + "/depth/camera_info", CameraInfo, queue_size=10)
+        self.world.repeat(10, lambda: info.publish(self.info))
         name = self.namespace + "/depth/image"
         cases = (
             ({"c": {"topic": "depth/image"}}, name + r" is a sensor_msgs/Image: give the source"),
@@ -261,8 +224,7 @@ class DepthImageTest(unittest.TestCase):
         )
         for sources, words in cases:
             with self.subTest(words):
-                rospy.delete_param(self.node.name)
-                self.node = pt.ProximityNode(self.namespace, {"sources": sources}, pt.urdf())
+                self.start(sources=sources)
                 expected = re.compile(words)
                 message = self.node.wait_for(
                     lambda m: expected.search(m.status_text), words  # noqa: B023
@@ -272,13 +234,10 @@ class DepthImageTest(unittest.TestCase):
                 self.node.wait_until(
                     lambda: expected.search(self.node.log()), "the log"  # noqa: B023
                 )
-                if sources is not cases[-1][0]:
-                    self.node.stop()
+                self.finish(self.node)
+                rospy.delete_param(self.node.name)
         other.unregister()
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("depth_image_test")
-    rostest.rosrun("ist_proximity", "depth_image_test", DepthImageTest, sys.argv)
+    pt.run("depth_image_test", DepthImageTest)

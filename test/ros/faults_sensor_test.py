@@ -2,13 +2,11 @@
 """Faults of a sensor: it stops, freezes, errs about the time, changes frame or layout."""
 
 import itertools
-import sys
 import time
 
 import faults
 import numpy as np
 import proximity_testing as pt
-import rospy
 from faults import CLOUD_TIMEOUT, PERIOD
 from proximity_testing import ProximityArray
 from sensor_msgs.msg import PointField
@@ -103,10 +101,8 @@ class FaultsSensorTest(faults.FaultTest):
 
         self.sensor.pause(node)
         self.sensor.change = to_other
-        begin = len(node.messages)
         self.sensor.resume()
-        node.wait_for(lambda m: len(node.messages) > begin + 60, "answers")
-        for message in node.messages[begin + 30 : begin + 60]:
+        for message in node.next_messages(60)[30:60]:
             self.assertEqual(message.status, ProximityArray.OK, message.status_text)
 
     def test_sensors_on_one_topic(self):
@@ -141,10 +137,8 @@ class FaultsSensorTest(faults.FaultTest):
 
         self.sensor.pause(node)
         self.sensor.change = to_float64
-        begin = len(node.messages)
         self.sensor.resume()
-        node.wait_for(lambda m: len(node.messages) > begin + 60, "answers")
-        for message in node.messages[begin + 30 : begin + 60]:
+        for message in node.next_messages(60)[30:60]:
             self.assertEqual(message.status, ProximityArray.OK, message.status_text)
 
         def to_colours(message):
@@ -186,7 +180,4 @@ class FaultsSensorTest(faults.FaultTest):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("faults_sensor_test")
-    rostest.rosrun("ist_proximity", "faults_sensor_test", FaultsSensorTest, sys.argv)
+    pt.run("faults_sensor_test", FaultsSensorTest)

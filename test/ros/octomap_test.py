@@ -4,9 +4,7 @@
 import os
 import shutil
 import struct
-import sys
 import tempfile
-import unittest
 
 import genpy.dynamic
 import numpy as np
@@ -15,7 +13,6 @@ import rospy
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import PointCloud2
 
-FAR_BOX = pt.transform((0, 0.8, 0))
 RESOLUTION = 0.05
 Octomap = genpy.dynamic.generate_dynamic(
     "octomap_msgs/Octomap",
@@ -130,31 +127,18 @@ def box_truth(boxes, p_map_box):
     return np.linalg.norm(away, axis=1).min()
 
 
-class OctomapTest(unittest.TestCase):
+class OctomapTest(pt.NodeTest):
     def setUp(self):
-        self.namespace = "/" + self._testMethodName
+        super().setUp()
         self.folder = tempfile.mkdtemp()
-        self.world = pt.World(self.namespace).stand(box=FAR_BOX)
+        self.addCleanup(shutil.rmtree, self.folder)
         self.world.poses["map"] = ("base", pt.transform())
         self.world.start_tf()
-        self.node = None
-        self.publisher = None
-
-    def tearDown(self):
-        self.world.stop()
-        shutil.rmtree(self.folder)
-        if self.publisher:
-            self.publisher.unregister()
-        if self.node:
-            for m in self.node.messages:
-                pt.check_invariants(self, m)
-            self.assertEqual(self.node.stop(), 0)
 
     def start(self, sources, **parameters):
         # Without a deadline: on a slow machine it would pass, which is not what these tests are about.
         parameters.update({"sources": sources, "query/tolerance": 0.0, "query/deadline": 0.0})
-        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
-        return self.node
+        return super().start(**parameters)
 
     def topic(self, **parameters):
         """A source on the topic `octomap`, and its publisher."""
@@ -170,12 +154,7 @@ class OctomapTest(unittest.TestCase):
         return path
 
     def wait_for_ball(self, truth, what):
-        m = self.node.wait_for(
-            lambda m: m.status == 0
-            and m.links
-            and abs(pt.link(m, "ball_link").distance - truth) < 1e-6,
-            "%s: %.6f m" % (what, truth),
-        )
+        m = self.node.wait_for_distance(truth, what)
         self.assertLessEqual(pt.link(m, "ball_link").lower_bound, truth)
         self.assertGreater(pt.link(m, "ball_link").lower_bound, truth - 1e-4)
         return m
@@ -189,7 +168,7 @@ class OctomapTest(unittest.TestCase):
             self.publisher.publish(message(tree, binary))
             m = self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the map")
             self.assertEqual(pt.link(m, "ball_link").source, "room")
-            truth = box_truth(tree.boxes(), FAR_BOX[:3, 3])
+            truth = box_truth(tree.boxes(), self.BOX[:3, 3])
             self.assertAlmostEqual(pt.link(m, "box_link").distance, truth, 6)
             self.assertEqual(m.sources[0].points_used, len(OCCUPIED))
             self.assertEqual(m.sources[0].points_received, len(OCCUPIED) + len(FREE))
@@ -235,10 +214,8 @@ class OctomapTest(unittest.TestCase):
         tree = Tree()
         self.publisher.publish(message(tree))
         node.wait_for_status(ProximityArray.OK)
-        begin = len(node.messages)
-        node.wait_for(lambda m: len(node.messages) > begin + 300, "300 messages")
         errors = []
-        for m in node.messages[begin:]:
+        for m in node.next_messages(300):
             self.assertEqual(m.status, ProximityArray.OK, m.status_text)
             X = pt.inverse(X_base_map(m.header.stamp.to_sec()))
             errors.append(pt.link(m, "ball_link").distance - ball_truth(tree.boxes(), X))
@@ -251,15 +228,13 @@ class OctomapTest(unittest.TestCase):
 
         # The transform is lost, so the map's pose is not known.
         del self.world.poses["map"]
-        m = node.wait_for_status(ProximityArray.NO_CLOUD, "from 'map' to 'base'")
-        self.assertTrue(pt.all_unknown(m))
+        node.wait_for_unknown(ProximityArray.NO_CLOUD, "from 'map' to 'base'")
 
     def test_timeout(self):
         """Like every source, a map is stale after half a second by default."""
         node = self.start({"room": self.topic()})
         self.publisher.publish(message(Tree()))
-        m = node.wait_for_status(ProximityArray.STALE_CLOUD, "its timeout should be .inf")
-        self.assertTrue(pt.all_unknown(m))
+        node.wait_for_unknown(ProximityArray.STALE_CLOUD, "its timeout should be .inf")
         self.world.repeat(10, lambda: self.publisher.publish(message(Tree())))
         self.wait_for_ball(ball_truth(Tree().boxes(), pt.transform()), "a map ten times a second")
 
@@ -282,92 +257,32 @@ class OctomapTest(unittest.TestCase):
         )
         self.assertIn("went back by 3600.00 s", node.log())
 
-    def test_limits(self):
-        """A map that is farther out than allowed is refused before it is built."""
-        node = self.start({"room": self.topic(timeout=float("inf"))})
-        few = Tree([((5, 5, 0), 1)], [])
-        self.publisher.publish(message(few))
-        truth = ball_truth(few.boxes(), pt.transform())
-        self.wait_for_ball(truth, "a small map")
-        for one, words in (
-            (message(few, data=[2, 0], resolution=1000.0), "farther out than 10000 m"),
-            (message(few, resolution=1e-300), "resolution is 1e-300"),
-            (message(few, resolution=1e300), "resolution is 1e+300"),
-        ):
-            with self.subTest(words):
-                self.publisher.publish(one)
-                node.wait_until(
-                    lambda: "input room" in node.diagnostics
-                    and words in node.diagnostics["input room"].message,
-                    words,
-                )
-        self.wait_for_ball(truth, "the last good map")
-
-        # A map whose frame is far out is nowhere.
-        self.world.poses["far_map"] = ("base", pt.transform((0, -2e4, 0)))
-        self.publisher.publish(message(few, frame="far_map"))
-        m = node.wait_for_status(ProximityArray.NO_CLOUD, "(0, -20000, 0) m, allowed are at most")
-        self.assertTrue(pt.all_unknown(m))
-
-    def test_files_that_never_end(self):
-        """A FIFO would block, and /dev/zero would fill the memory; the node ends when it is told to."""
-        fifo = os.path.join(self.folder, "fifo.bt")
-        os.mkfifo(fifo)
-        large = self.write("large.bt", Tree().file(True))
-        os.truncate(large, 1 << 40)
-        sources = {"camera": {"topic": "cloud"}}
-        for name, path in (("fifo", fifo), ("zero", "/dev/zero"), ("large", large)):
-            sources[name] = {"type": "octomap_msgs/Octomap", "file": path, "required": False}
-        node = self.start(sources)
-        self.world.points = np.array([[0.0, 0.0, 0.3]])
-        self.world.start_clouds()
-        self.wait_for_ball(0.2, "the camera")
-        words = {"fifo": "no regular file", "zero": "no regular file", "large": "1099511627776 bytes"}
-        for name, text in words.items():
-            key = "input " + name
-            node.wait_until(
-                lambda: key in node.diagnostics and text in node.diagnostics[key].message, text
-            )
-
     def test_bad_maps(self):
+        """A map that cannot be used is told, and the last good one stays; one that is nowhere is unknown."""
         node = self.start({"room": self.topic(timeout=float("inf"))})
         good = message(Tree())
-        full = message(Tree(), binary=False)
-        bad = [
-            (message(Tree(), data=good.data[:-3]), "ends in the middle of the tree"),
-            (message(Tree(), False, data=full.data[:-1]), "ends in the middle of the tree"),
-            (message(Tree(), data=good.data + [0] * 7), "ends 7 bytes before"),
-            (message(Tree(), data=[-1] * 1000), "deeper than 16 levels"),
-            (message(Tree(), False, data=[-1] * 1000), "not finite"),
-            (message(Tree(), id="ColorOcTree"), "'ColorOcTree', it must be 'OcTree'"),
-            (message(Tree(), resolution=0.0), "resolution is 0"),
-            (message(Tree(), resolution=float("nan")), "resolution is nan"),
-            (message(Tree(), frame=""), "empty frame_id"),
-            (message(Tree(), frame="nowhere"), "nowhere"),
-        ]
-        for one, words in bad:
-            with self.subTest(words):
-                one.header.stamp = rospy.Time.now()
-                self.publisher.publish(one)
-                if "nowhere" in words:  # a map as it should be, but where is it?
-                    m = node.wait_for_status(ProximityArray.NO_CLOUD, words)
-                    self.assertTrue(pt.all_unknown(m))
-                else:
-                    node.wait_until(
-                        lambda: "input room" in node.diagnostics
-                        and words in node.diagnostics["input room"].message,
-                        words,
-                    )
-        good.header.stamp = rospy.Time.now()
+        truth = ball_truth(Tree().boxes(), pt.transform())
         self.publisher.publish(good)
-        self.wait_for_ball(ball_truth(Tree().boxes(), pt.transform()), "a good map")
+        self.wait_for_ball(truth, "a good map")
+        for one, words in (
+            (message(Tree(), data=good.data[:-3]), "ends in the middle of the tree"),
+            (message(Tree(), frame=""), "empty frame_id"),
+        ):
+            self.publisher.publish(one)
+            node.wait_for_diagnostic("input room", words)
+            self.wait_for_ball(truth, "the last good map")
+        self.world.poses["far_map"] = ("base", pt.transform((0, -2e4, 0)))
+        for frame, words in (("nowhere", "nowhere"), ("far_map", "(0, -20000, 0) m, allowed are at most")):
+            self.publisher.publish(message(Tree(), frame=frame))
+            node.wait_for_unknown(ProximityArray.NO_CLOUD, words)
+        self.publisher.publish(message(Tree()))
+        self.wait_for_ball(truth, "a good map again")
 
     def test_wrong_type(self):
         source = {"topic": "cloud", "type": "octomap_msgs/Octomap", "timeout": float("inf")}
         node = self.start({"room": source})
         self.world.start_clouds()
-        m = node.wait_for_status(ProximityArray.NO_CLOUD, "a sensor_msgs/PointCloud2 comes in")
-        self.assertTrue(pt.all_unknown(m))
+        node.wait_for_unknown(ProximityArray.NO_CLOUD, "a sensor_msgs/PointCloud2 comes in")
 
     def test_files(self):
         tree = Tree()
@@ -381,11 +296,8 @@ class OctomapTest(unittest.TestCase):
                 self.assertTrue(np.isnan(m.sources[0].age))
                 self.assertEqual(m.sources[0].points_used, len(OCCUPIED))
                 # Never stale.
-                begin = len(node.messages)
-                node.wait_for(lambda m: len(node.messages) > begin + 100, "100 messages")
-                self.assertEqual({m.status for m in node.messages[begin:]}, {ProximityArray.OK})
-                self.assertEqual(node.stop(), 0)
-                self.node = None
+                self.assertEqual({m.status for m in node.next_messages(100)}, {ProximityArray.OK})
+                self.finish(self.nodes.pop())
 
     def test_damaged_files(self):
         """A file that is no map is reported; a source that is not required does not hold back others."""
@@ -414,22 +326,8 @@ class OctomapTest(unittest.TestCase):
         for name, (_, words) in damaged.items():
             with self.subTest(name):
                 key = "input " + name.replace(".", "_")
-                node.wait_until(
-                    lambda: key in node.diagnostics and words in node.diagnostics[key].message, words
-                )
+                node.wait_for_diagnostic(key, words)
                 self.assertIn(name, node.diagnostics[key].message)
-
-    def test_required_damaged_file(self):
-        path = self.write("cut.bt", Tree().file(True)[:-5])
-        sources = {
-            "camera": {"topic": "cloud"},
-            "room": {"type": "octomap_msgs/Octomap", "file": path},
-        }
-        node = self.start(sources)
-        self.world.start_clouds()
-        m = node.wait_for_status(ProximityArray.NO_CLOUD, "ends in the middle of the tree")
-        self.assertTrue(pt.all_unknown(m))
-        self.assertIn("cut.bt", m.status_text)
 
     def test_map_and_cloud(self):
         """Each answer names the nearer of two sources."""
@@ -460,7 +358,4 @@ class OctomapTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("octomap_test")
-    rostest.rosrun("ist_proximity", "octomap_test", OctomapTest, sys.argv)
+    pt.run("octomap_test", OctomapTest)

@@ -3,7 +3,6 @@
 convention says that the space is free: every kind of content in every kind of message, for sources that are
 required, optional, with a memory, and with unknown space as an obstacle."""
 
-import sys
 import unittest
 
 import numpy as np
@@ -197,6 +196,8 @@ class UnmeasuredTest(unittest.TestCase):
             self.assertEqual(source.status, ProximityArray.NO_CLOUD, message)
             self.assertEqual(message.status, ProximityArray.NO_CLOUD, message)
             self.assertTrue(pt.all_unknown(message), message)
+            if what == "NaN":
+                self.assertRegex(message.status_text, "every point of the newest (cloud|image|scan) is NaN")
         stamps = watched.stamps_of(begin)
         for state in watched.scales[-40:]:
             if state.header.stamp in stamps and not is_free:
@@ -209,8 +210,7 @@ class UnmeasuredTest(unittest.TestCase):
         """The same bytes with new stamps, which a simulation without noise may send."""
         self.watched = [Watched(kind, "frozen") for kind in TYPES]
         for watched in self.watched:
-            message = watched.node.wait_for_status(ProximityArray.STALE_CLOUD, "the same bytes")
-            self.assertTrue(pt.all_unknown(message))
+            watched.node.wait_for_unknown(ProximityArray.STALE_CLOUD, "the same bytes")
         noise = np.random.default_rng(1)
         self.make = {
             "cloud": lambda: pt.cloud(points(1.4 + 1e-3 * noise.random())),
@@ -244,7 +244,4 @@ class UnmeasuredTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("unmeasured_test", disable_signals=True)
-    rostest.rosrun("ist_proximity", "unmeasured", UnmeasuredTest, sys.argv)
+    pt.run("unmeasured_test", UnmeasuredTest, disable_signals=True)
