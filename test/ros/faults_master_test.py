@@ -84,16 +84,24 @@ class MasterDiesTest(MasterTest):
         node = self.start()
         node.wait_until(lambda: len(node.diagnostics) >= 4, "diagnostics")
         MASTER.kill()
-        told = self.wait_for_word(node, ("parameter server",))
+        told = self.wait_for_word(node, ("does not answer",))
         message = self.watch(node, 3.0)
         self.record("roscore dies", "kill -9; ~query/margin is 50 mm", message, None,
                     "told after %.0f ms, in log and diagnostics" % told, None,
                     said="OK, with the parameters of before: the margin stays")
         MASTER.start()  # which knows no node and no parameter
         message = self.watch(node, 3.0)
+        lost = "no longer on the parameter server: ~query/margin (0.05 m)"
+        self.assertIn(lost, node.diagnostic("query", "live parameters"))
         self.record("roscore restarts", "with an empty parameter server", message, None,
                     "connections and parameters stay; start the node again to be found by new nodes",
                     None, said="OK, with the parameters of before: the margin stays")
+        # Something valid replaces the margin.
+        rospy.set_param(node.name + "/query/margin", 2 * MARGIN)
+        node.wait_for(
+            lambda m: m.status == 0 and m.links[0].distance - m.links[0].lower_bound > 1.9 * MARGIN,
+            "the new margin",
+        )
 
 
 class ParametersTest(MasterTest):

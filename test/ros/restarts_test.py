@@ -1,7 +1,11 @@
 #!/usr/bin/env python3
-"""Sensors whose stamps go back are heard again, and a clock at its end does not end the node."""
+"""Sensors whose stamps go back are heard again, a clock at its end does not end the node, SIGINT always does."""
 
-import sys
+import os
+import signal
+import socket
+import subprocess
+import tempfile
 import unittest
 
 import proximity_testing as pt
@@ -73,13 +77,28 @@ class LateClockTest(unittest.TestCase):
         self.assertEqual(node.stop(), 0)
 
 
-class RestartTest(unittest.TestCase):
-    """A camera whose driver starts again with a clock that is behind."""
+class RestartTest(pt.NodeTest):
+    def test_start_without_master(self):
+        """A node that is told to end while it waits for the master ends, without a word of a crash."""
+        with socket.socket() as s, tempfile.TemporaryFile() as log:
+            s.bind(("localhost", 0))  # and nobody listens
+            environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % s.getsockname()[1])
+            command = [pt.find_program("ist_proximity", "proximity_node")]
+            node = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
+
+            def said():
+                log.seek(0)
+                return log.read().decode()
+
+            pt.wait_until(lambda: "Failed to contact master" in said(), "the wait for the master")
+            node.send_signal(signal.SIGINT)
+            self.assertEqual(node.wait(pt.TIMEOUT), 0, said())
+            self.assertNotIn("ASSERTION", said())
 
     def test_camera(self):
-        namespace = "/restarts"
-        world = pt.World(namespace).stand(box=FAR_BOX)
-        node = pt.ProximityNode(namespace, {"cloud_timeout": 8.0, "self_filter": False}, pt.urdf())
+        """A camera whose driver starts again with a clock that is behind."""
+        world = self.world
+        node = self.start(cloud_timeout=8.0, self_filter=False)
         world.start_tf()
         behind = [0.0, 0.3]  # [s] the clock, [m] the point
 
@@ -88,33 +107,17 @@ class RestartTest(unittest.TestCase):
             world.cloud_publisher.publish(pt.cloud([[0.0, 0.0, behind[1]]], stamp=stamp))
 
         world.repeat(20, send)
-        self.wait_for_ball(node, 0.2)
+        node.wait_for_distance(0.2, "the camera", within=1e-4)
         # Two seconds behind: within the timeout, and it is what the sensor sees now.
         behind[:] = [2.0, 0.5]
-        self.wait_for_ball(node, 0.4)
+        node.wait_for_distance(0.4, "two seconds behind", within=1e-4)
         self.assertIn("went back by", node.log())
         # A minute behind: stale. The last good cloud stays in use until it is stale itself.
         behind[:] = [60.0, 0.3]
-        message = node.wait_for_status(ProximityArray.STALE_CLOUD, "clock gone back?")
-        self.assertTrue(pt.all_unknown(message))
+        node.wait_for_unknown(ProximityArray.STALE_CLOUD, "clock gone back?")
         behind[:] = [0.0, 0.3]
-        self.wait_for_ball(node, 0.2)
-        for m in node.messages:
-            pt.check_invariants(self, m)
-        world.stop()
-        self.assertEqual(node.stop(), 0)
-
-    def wait_for_ball(self, node, truth):
-        node.wait_for(
-            lambda m: m.status == 0 and abs(pt.link(m, "ball_link").distance - truth) < 1e-4,
-            "%.1f m" % truth,
-        )
+        node.wait_for_distance(0.2, "the clock put right", within=1e-4)
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("restarts_test")
-    kinds = {"clock": LateClockTest, "sensors": RestartTest}
-    suite = sys.argv[1] if len(sys.argv) > 1 else ""
-    rostest.rosrun("ist_proximity", "restarts_" + suite, kinds[suite], sys.argv)
+    pt.run("restarts_test", {"clock": LateClockTest, "sensors": RestartTest})
