@@ -2,8 +2,6 @@
 """Names that other programs rely on: fields, constants, topics, services, and effects of parameters."""
 
 import subprocess
-import sys
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -53,21 +51,12 @@ TOPICS = {
 SERVICES = {"query": QueryProximity, "reload_model": Trigger}
 
 
-class ContractTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace).stand(box=pt.transform((0, 0.8, 0)))
-        self.world.points = np.array(POINTS)
-        self.world.start_tf()
-        self.node = None
-
-    def tearDown(self):
-        self.world.stop()
-        if self.node:
-            self.assertEqual(self.node.stop(), 0)
+class ContractTest(pt.NodeTest):
+    POINTS = POINTS
 
     def start(self, urdf=None, **parameters):
-        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
+        super().start(urdf, **parameters)
+        self.world.start_tf()
         self.world.start_clouds()
         return self.node
 
@@ -123,15 +112,6 @@ class ContractTest(unittest.TestCase):
         node = self.start(robot_description="urdf_of_another_name")
         node.wait_for_status(ProximityArray.OK)
 
-    def test_links(self):
-        """The answer has the named links only; where all links filter, points on others are no obstacles."""
-        node = self.start(pt.urdf(), links=["box_link"], self_filter_links="all")
-        message = node.wait_for_status(ProximityArray.OK)
-        self.assertEqual([one.link for one in message.links], ["box_link"])
-        self.assertEqual(message.sources[0].points_on_robot, 1)
-        truth = pt.distance_to_box(np.array(POINTS[:1]) - [0, 0.8, 0])[0]
-        self.assertAlmostEqual(message.links[0].distance, truth, delta=0.0011)
-
     def test_geometry(self):
         """The visual geometry is used on request, or where there is no other."""
         visual = '<visual><geometry><sphere radius="%g"/></geometry></visual></link>'
@@ -152,12 +132,8 @@ class ContractTest(unittest.TestCase):
                 self.assertAlmostEqual(pt.link(message, "hat").distance, 0.15, 5)
                 said = "'hat' has no collision geometry" in node.log()
                 self.assertEqual(said, geometry == "collision", node.log())
-                self.assertEqual(node.stop(), 0)
-                self.node = None
+                self.finish(self.nodes.pop())
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("contract_test")
-    rostest.rosrun("ist_proximity", "contract_test", ContractTest, sys.argv)
+    pt.run("contract_test", ContractTest)

@@ -2,12 +2,10 @@
 """Wrong parameters: the node does not start, and names each one, the reason and the range."""
 
 import os
-import sys
 import unittest
 
 import numpy as np
 import proximity_testing as pt
-import rospy
 import rosparam
 import yaml
 
@@ -197,6 +195,19 @@ WRONG = [
         ],
     ),
     ({"unknown_space": "obstacle"}, ["~unknown_space is obstacle", "set ~memory/enabled"]),
+    (
+        {
+            "zones": {
+                "huge": {"frame_id": "base", "shape": "sphere", "radius": 100.0},
+                "flat": {"frame_id": "base", "shape": "box", "size": [1.0, -1.0, 1.0]},
+            }
+        },
+        ["zone 'huge' cannot be used: it measures 200 m", "~zones/flat/size"],
+    ),
+    (
+        {"zones": {"nowhere": {"shape": "sphere", "radius": 0.1}}},
+        ["zone 'nowhere' cannot be used: its frame"],
+    ),
     ({"robot_description": pt.urdf()}, ["~robot_description holds a URDF: it must be the name"]),
     ({"robot_description": "the robot"}, ["the robot", "is not valid"]),
     ({"sources": {"a camera": {"timeout": 1.0}}}, ["a camera", "is not valid"]),
@@ -299,7 +310,4 @@ class ParametersTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("parameters_test")
-    rostest.rosrun("ist_proximity", "parameters_test", ParametersTest, sys.argv)
+    pt.run("parameters_test", ParametersTest)

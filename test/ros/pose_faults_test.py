@@ -7,12 +7,11 @@ Run with other arguments, this program is a second publisher: two nodes cannot b
 import subprocess
 import sys
 import time
-import unittest
 
 import numpy as np
 import proximity_testing as pt
 import rospy
-from joint_states_test import ARM, joint_state, motion
+from joint_states_test import ARM, JointStatesTest, joint_state, motion
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import JointState
 
@@ -36,42 +35,31 @@ def run_rival(kind, namespace):
         rate.sleep()
 
 
-class PoseFaultsTest(unittest.TestCase):
+class PoseFaultsTest(pt.NodeTest):
+    BOX, MAX_DISTANCE = None, 2.0
+
     def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.publisher = rospy.Publisher(
-            self.namespace + "/joint_states", JointState, queue_size=100
-        )
-        self.world = pt.World(self.namespace)
-        self.node, self.rival = None, None
+        super().setUp()
+        self.publisher = JointStatesTest.joint_publisher(self.namespace)
+        self.rival = None
         self.change = lambda message: message  # of each joint state before it is sent
         self.received = []  # (time of receipt, message)
         self.good = rospy.Time(0)  # stamp of the last joint state that is as it should be
 
     def tearDown(self):
-        self.world.stop()
         if self.rival:
             self.rival.kill()
             self.rival.wait()
-        if self.node:
-            for _, message in self.received:
-                pt.check_invariants(self, message, 2.0)
-            stamps = [message.header.stamp for _, message in self.received]
-            self.assertEqual(stamps, sorted(stamps))
-            self.assertEqual(self.node.stop(), 0)
+        super().tearDown()
+        stamps = [message.header.stamp for _, message in self.received]
+        self.assertEqual(stamps, sorted(stamps))
 
-    def start(self, urdf=ARM, **parameters):
-        parameters.setdefault("pose_source", "joint_states")
-        parameters.setdefault("max_distance", 2.0)
-        parameters.setdefault("self_filter", False)
-        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
+    def start(self, urdf=ARM, pose_source="joint_states", **parameters):
+        super().start(urdf, pose_source=pose_source, max_distance=2.0, self_filter=False, **parameters)
         self.node.subscribe(
             "proximity", ProximityArray, lambda m: self.received.append((rospy.Time.now(), m))
         )
-        publisher = self.world.cloud_publisher
-        self.clouds = self.world.repeat(
-            20, lambda: publisher.publish(pt.cloud([[0.6, 0.6, 0.6]], "base"))
-        )
+        self.clouds = self.world.start_points([[0.6, 0.6, 0.6]])
         return self.node
 
     def start_joints(self, moving=True):
@@ -100,12 +88,6 @@ class PoseFaultsTest(unittest.TestCase):
         pt.wait_until(times, "status %d" % status)
         return min(times())
 
-    def wait_for_diagnostic(self, name, words):
-        self.node.wait_until(
-            lambda: name in self.node.diagnostics and words in self.node.diagnostics[name].message,
-            words,
-        )
-
     def disturb(self, change, words, limit):
         """Changes the joint states; returns the messages until the node names the fault.
 
@@ -121,8 +103,7 @@ class PoseFaultsTest(unittest.TestCase):
         told = self.first(ProximityArray.NO_POSE, good)
         print("%s: %.0f ms" % (words, 1e3 * (told - good).to_sec()))
         self.assertLess((told - good).to_sec(), limit + SLACK)
-        count = len(self.node.messages)
-        self.node.wait_for(lambda m: len(self.node.messages) > count + 5, "some more")
+        self.node.next_messages(6)
         for t, m in self.received:
             if m.status == ProximityArray.OK and t > good:
                 self.assertLessEqual(m.header.stamp, good + rospy.Duration(limit))
@@ -231,7 +212,7 @@ class PoseFaultsTest(unittest.TestCase):
         self.change = ahead
         joints = self.start_joints()
         node.wait_for_status(ProximityArray.OK)
-        self.wait_for_diagnostic("pose", "ahead of the clock")
+        node.wait_for_diagnostic("pose", "ahead of the clock")
         self.check_ahead(joints.stop, ProximityArray.NO_POSE, 0.3)
         self.assertIn("ahead of the clock", node.log())
         # A clock that is right again is no old one.
@@ -254,7 +235,7 @@ class PoseFaultsTest(unittest.TestCase):
         clouds = self.world.repeat(20, send)
         self.start_joints()
         node.wait_for_status(ProximityArray.OK)
-        self.wait_for_diagnostic("input cloud", "ahead of the clock")
+        node.wait_for_diagnostic("input cloud", "ahead of the clock")
         self.check_ahead(clouds.stop, ProximityArray.STALE_CLOUD, 0.4)
 
     def test_refused_transforms(self):
@@ -285,8 +266,7 @@ class PoseFaultsTest(unittest.TestCase):
             message = node.wait_for_status(ProximityArray.NO_POSE, words)
             self.assertIn("the transform from 'ball_link' to 'base'", message.status_text)
             self.assertNotIn("is robot_state_publisher running", message.status_text)
-            begin = len(node.messages)
-            node.wait_for(lambda m: len(node.messages) > begin + 50, "some more")
+            node.next_messages(50)
             repeater.stop()
             tf.paused = False
             node.wait_for_status(ProximityArray.OK)
@@ -294,30 +274,6 @@ class PoseFaultsTest(unittest.TestCase):
         lines = node._log.read().decode().splitlines()
         about_tf = [line for line in lines if "ball_link" in line or "TF_" in line or "tf2" in line]
         self.assertLess(len(about_tf), 10, "\n".join(about_tf))
-
-    def test_static_transform_that_moves(self):
-        """tf2 keeps it without time: its last pose would count for ever."""
-        node = self.start(pt.urdf(), pose_source="tf")
-        self.world.poses = {"box_link": ("base", pt.transform((0, 0.8, 0)))}
-        self.world.start_tf()
-
-        def stand():
-            X = pt.transform()
-            statics = [pt.transform_message("base", f, X, rospy.Time.now()) for f in ("camera", "ball_link")]
-            self.world._tf_static.publish(statics)
-
-        stand()
-        node.wait_for_status(ProximityArray.OK)
-        self.world.poses["ball_link"] = ("base", lambda t: pt.transform((0.1 * np.sin(t), 0, 0)))
-        message = node.wait_for_status(ProximityArray.NO_POSE, "was static, and ")
-        self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.UNKNOWN)
-        self.assertNotEqual(pt.link(message, "box_link").state, LinkProximity.UNKNOWN)
-        del self.world.poses["ball_link"]
-        begin = len(node.messages)
-        node.wait_for(lambda m: len(node.messages) > begin + 100, "some more")
-        self.assertEqual({m.status for m in node.messages[begin:]}, {ProximityArray.NO_POSE})
-        stand()
-        node.wait_for_status(ProximityArray.OK)
 
     def test_a_sensor_that_turns_while_tf_is_silent(self):
         """tf2 interpolates its pose evenly over the silence, in which it stood still at first."""
@@ -359,10 +315,7 @@ class PoseFaultsTest(unittest.TestCase):
         message = node.wait_for_status(ProximityArray.NO_POSE, "has two publishers that disagree")
         self.assertIn("joint 'turn'", message.status_text)
         self.assertIn("/rival_joints", message.status_text)
-        begin = len(node.messages)
-        node.wait_for(lambda m: len(node.messages) > begin + 100, "some more")
-        for m in node.messages[begin:]:
-            self.assertEqual(m.status, ProximityArray.NO_POSE)
+        self.assertEqual({m.status for m in node.next_messages(100)}, {ProximityArray.NO_POSE})
         self.rival.kill()
         node.wait_for_status(ProximityArray.OK)
 
@@ -387,7 +340,4 @@ if __name__ == "__main__":
     if "rival" in sys.argv:
         run_rival(*sys.argv[2:4])
         sys.exit()
-    import rostest
-
-    rospy.init_node("pose_faults_test")
-    rostest.rosrun("ist_proximity", "pose_faults_test", PoseFaultsTest, sys.argv)
+    pt.run("pose_faults_test", PoseFaultsTest)

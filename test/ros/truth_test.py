@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Distances, bounds, witnesses, frames, stamps and vectors against truth that is easy to compute."""
 
-import sys
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -26,24 +24,14 @@ def cloud_around(rng, n=3000):
     return points[free]
 
 
-class TruthTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.node = None
-        self.world = pt.World(self.namespace, X_BC).stand(BALL, BOX)
-
-    def tearDown(self):
-        self.world.stop()
-        if self.node:
-            for message in self.node.messages:
-                pt.check_invariants(self, message, self.max_distance)
-            self.assertEqual(self.node.stop(), 0)
+class TruthTest(pt.NodeTest):
+    CAMERA, BALL, BOX = X_BC, BALL, BOX
 
     def start(self, points, **parameters):
         """The node, links in tf and a stream of clouds of points given in base."""
-        self.max_distance = parameters.get("max_distance", 1.0)
+        self.MAX_DISTANCE = parameters.get("max_distance", 1.0)
         self.world.points = pt.apply(pt.inverse(X_BC), points)
-        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        super().start(**parameters)
         self.world.start_tf()
         self.world.start_clouds()
         return self.node
@@ -54,7 +42,7 @@ class TruthTest(unittest.TestCase):
             one = pt.link(message, name)
             every = pt.DISTANCE[name](pt.apply(pt.inverse(X_FL), points))
             truth = every.min()
-            self.assertLessEqual(abs(truth), self.max_distance)
+            self.assertLessEqual(abs(truth), self.MAX_DISTANCE)
             self.assertGreaterEqual(one.distance, truth - 1e-5)
             self.assertLessEqual(one.distance, truth + tolerance + 1e-5)
             self.assertLessEqual(one.lower_bound, truth + 1e-5)
@@ -191,8 +179,7 @@ class TruthTest(unittest.TestCase):
             seen = pt.apply(pt.inverse(X_BM(stamp.to_sec())), points)
             self.world.cloud_publisher.publish(pt.cloud(seen, "moving_camera", stamp))
 
-        self.max_distance = 1.0
-        self.node = node = pt.ProximityNode(self.namespace, {"fixed_frame": "world"}, pt.urdf())
+        node = super().start(fixed_frame="world")
         self.world.start_tf(100)
         self.world.repeat(20, send_late)
         message = node.wait_for_status(ProximityArray.OK)
@@ -250,18 +237,20 @@ class TruthTest(unittest.TestCase):
         self.assertEqual(pt.link(message, "box_link").state, LinkProximity.CLEAR)
 
     def test_moving_obstacle(self):
-        """The cloud's change adds to the closing speed, measured with the clouds' own stamps."""
+        """The cloud's change adds to the closing speed, measured with the clouds' own stamps.
+
+        A slash before a frame's name is not part of it.
+        """
         speed, turn = 0.1, 4.0
 
         def send():  # to and fro along y, 0.1 m/s
             stamp = rospy.Time.now()
             phase = stamp.to_sec() % turn
             y = 0.5 - speed * (phase if phase < turn / 2 else turn - phase)
-            self.world.cloud_publisher.publish(pt.cloud([[0.0, y, 0.0]], "base", stamp))
+            self.world.cloud_publisher.publish(pt.cloud([[0.0, y, 0.0]], "/base", stamp))
 
-        self.max_distance = 1.0
         self.world.stand(pt.transform((0, 0, 0)), pt.transform((5, 5, 5)))
-        self.node = pt.ProximityNode(self.namespace, {}, pt.urdf())
+        super().start()
         self.world.start_tf()
         self.world.repeat(20, send)
         checked = 0
@@ -310,37 +299,15 @@ class TruthTest(unittest.TestCase):
             self.assertLess(np.linalg.norm(kept - p, axis=1).min(), 1e-5)
 
     def test_range_and_clear(self):
-        """~max_distance, ranges of the source; markers come and go."""
-        markers, spheres, deleted = {}, [], set()
-
-        def on_markers(array):
-            for marker in array.markers:
-                key = (marker.ns, marker.id)
-                if marker.action == Marker.ADD:
-                    markers[key] = marker
-                else:
-                    self.assertIn(key, markers)
-                    deleted.add(key)
-
+        """~max_distance, ranges of the source, and the spheres in rviz."""
+        spheres = []
         near = pt.apply(BALL, [[0.0, 0.0, 0.35]])
         far_away = pt.apply(X_BC, [[0.0, 0.0, 2.5]])
         node = self.start(np.vstack([near, far_away]), max_distance=0.3, max_range=2.0)
-        node.subscribe("markers", MarkerArray, on_markers)
         node.subscribe("spheres", MarkerArray, spheres.append)
         message = node.wait_for_status(ProximityArray.OK)
         self.assertEqual(message.sources[0].points_used, 1)
         self.assertEqual(pt.states(message), [LinkProximity.NEAR, LinkProximity.CLEAR])
-
-        names = {"distance", "point_on_link", "point_on_obstacle", "repulsion", "text"}
-        of_links = lambda: {key for key in markers if key[0] != "nearest"}  # noqa: E731
-        node.wait_until(lambda: {ns for ns, _ in of_links()} == names, "all markers of one link")
-        line = markers[("distance", 0)]
-        self.assertEqual(line.header.frame_id, "base")
-        ends = [pt.vector(p) for p in line.points]
-        self.assertAlmostEqual(np.linalg.norm(ends[0] - ends[1]), 0.25, 4)
-        self.assertEqual({i for _, i in of_links()}, {0})
-        self.assertEqual({i for ns, i in markers if ns == "nearest"}, {0, 1, 2})
-        self.assertRegex(markers[("nearest", 0)].text, r"^0\.250 m\nball_link")
 
         node.wait_until(lambda: spheres, "~spheres")
         first = [m for m in spheres[0].markers if m.ns == "ball_link"]
@@ -357,38 +324,7 @@ class TruthTest(unittest.TestCase):
             lambda m: pt.states(m) == [LinkProximity.CLEAR] * 2 and m.status == 0, "CLEAR"
         )
         self.assertEqual(message.sources[0].points_used, 0)
-        # The large number says that nothing is near; every other marker goes.
-        kept = {("nearest", 0)}
-        node.wait_until(lambda: deleted == set(markers) - kept, "DELETE for every other marker")
-        node.wait_until(lambda: markers[("nearest", 0)].text == "> 0.30 m", "the number")
-
-    def test_formats(self):
-        """float64, the other byte order and a frame with a slash give the same distances."""
-        points = np.random.default_rng(3).uniform(-1, 1, (200, 3)) + [0, 0, 3]
-        points[0] = pt.apply(BALL, [[0.2, 0, 0]])[0]
-        node = self.start(points, max_range=10.0)
-        truth = pt.link(node.wait_for_status(ProximityArray.OK), "ball_link").distance
-        self.assertAlmostEqual(truth, 0.1, 5)
-        variants = (("<f8", "camera"), (">f4", "camera"), (">f8", "camera"), ("<f4", "/camera"))
-        for dtype, frame in variants:
-            stamp = []
-
-            def send(dtype=dtype, frame=frame, stamp=stamp):
-                message = pt.cloud(self.world.points, frame, dtype=dtype)
-                stamp.append(message.header.stamp)
-                self.world.cloud_publisher.publish(message)
-
-            self.world.send_cloud = lambda: None
-            repeater = self.world.repeat(20, send)
-            message = node.wait_for(
-                lambda m: stamp and m.cloud_stamp in stamp, "a cloud of " + dtype + frame
-            )
-            self.assertAlmostEqual(pt.link(message, "ball_link").distance, truth, 6)
-            repeater.stop()
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("truth_test")
-    rostest.rosrun("ist_proximity", "truth_test", TruthTest, sys.argv)
+    pt.run("truth_test", TruthTest)

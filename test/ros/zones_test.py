@@ -1,18 +1,12 @@
 #!/usr/bin/env python3
 """Zones whose points are no obstacles, and links that are left out for a while."""
 
-import sys
 
 import numpy as np
 import proximity_testing as pt
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
-from ist_proximity.srv import (
-    IgnoreLinks,
-    RemoveZone,
-    SetZone,
-    SetZoneRequest,
-)
+from ist_proximity.srv import IgnoreLinks, RemoveZone, SetZone, SetZoneRequest
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float64
@@ -43,10 +37,9 @@ class ZonesTest(pt.NodeTest):
     def start_node(self, **parameters):
         node = self.start(self_filter=False, **parameters)
         node.wait_for_status(ProximityArray.OK)
-        proxy = lambda name, kind: rospy.ServiceProxy(node.name + "/" + name, kind)  # noqa: E731
-        self.set_zone, self.remove = proxy("set_zone", SetZone), proxy("remove_zone", RemoveZone)
-        self.ignore = proxy("ignore_links", IgnoreLinks)
-        self.set_zone.wait_for_service(pt.TIMEOUT)
+        self.set_zone = node.service("set_zone", SetZone)
+        self.remove = node.service("remove_zone", RemoveZone)
+        self.ignore = node.service("ignore_links", IgnoreLinks)
         return node
 
     def wait_for_distance(self, link, distance, zones):
@@ -209,22 +202,6 @@ class ZonesTest(pt.NodeTest):
             "the unknown link to be told",
         )
 
-    def test_wrong_parameters_are_refused(self):
-        zones = {
-            "huge": {"frame_id": "base", "shape": "sphere", "radius": 100.0},
-            "flat": {"frame_id": "base", "shape": "box", "size": [1.0, -1.0, 1.0]},
-            "nowhere": {"shape": "sphere", "radius": 0.1},
-        }
-        for name, text in (
-            ("huge", "zone 'huge' cannot be used: it measures 200 m"),
-            ("flat", "~zones/flat/size"),
-            ("nowhere", "zone 'nowhere' cannot be used: its frame"),
-        ):
-            namespace = self.namespace + "/" + name
-            node = pt.ProximityNode(namespace, {"zones": {name: zones[name]}}, pt.urdf(), listen=False)
-            pt.wait_until(lambda node=node: node.process.poll() is not None, "the node to refuse " + name)
-            self.assertIn(text, node.log())
-
     def check_refused(self, text, **arguments):
         answer = self.set_zone(request(**arguments))
         self.assertFalse(answer.success)
@@ -298,7 +275,4 @@ class ZonesTest(pt.NodeTest):
 
 
 if __name__ == "__main__":
-    import rostest
-
-    rospy.init_node("zones_test")
-    rostest.rosrun("ist_proximity", "zones_test", ZonesTest, sys.argv)
+    pt.run("zones_test", ZonesTest)
