@@ -10,6 +10,7 @@
 #include <octomap/OccupancyOcTreeBase.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -26,10 +27,11 @@ namespace ist {
 
 /// The part of a tree that becomes obstacles.
 struct OctomapSelection {
-  /// 1 to 16: leaves below this depth are joined, so that boxes are larger and fewer; an inner node
-  /// is occupied where a child is. 0: all leaves as they are.
+  /// 1 to 16: leaves below this depth are joined, so that boxes are larger and fewer; a joined one
+  /// is occupied where a leaf in it is. 0: all leaves as they are.
   unsigned max_depth = 0;
-  /// [m] in the map's frame: leaves that do not reach into it are left out. Empty: none is.
+  /// [m] in the map's frame: leaves that do not reach into it are left out. Empty: none
+  /// is.
   Eigen::AlignedBox3d region;
   OctreeLimits limits;  ///< more leaves, or farther ones, are refused (max_leaves, max_position)
 };
@@ -46,13 +48,14 @@ std::vector<Eigen::AlignedBox3d> occupied_boxes(const octomap::OccupancyOcTreeBa
     throw std::invalid_argument("max_depth is " + std::to_string(selection.max_depth) +
                                 "; a tree has " + std::to_string(tree.getTreeDepth()) + " levels.");
   }
+  const unsigned depth = selection.max_depth > 0 ? selection.max_depth : tree.getTreeDepth();
   std::vector<Eigen::AlignedBox3d> boxes;
   const auto end = tree.end_leafs();
-  for (auto leaf = tree.begin_leafs(static_cast<unsigned char>(selection.max_depth)); leaf != end;
-       ++leaf) {
+  // All leaves are asked: what an inner node says is old where leaves were updated lazily.
+  for (auto leaf = tree.begin_leafs(); leaf != end; ++leaf) {
     if (!tree.isNodeOccupied(*leaf)) continue;
     // Corners are whole numbers times the resolution, so that neighbours meet exactly.
-    const int size = 1 << (tree.getTreeDepth() - leaf.getDepth());
+    const int size = 1 << (tree.getTreeDepth() - std::min(leaf.getDepth(), depth));
     const octomap::OcTreeKey key = leaf.getIndexKey();
     const Eigen::Vector3i low =
         (Eigen::Vector3i(key[0], key[1], key[2]) / size * size).array() - kHalf;
@@ -60,6 +63,10 @@ std::vector<Eigen::AlignedBox3d> occupied_boxes(const octomap::OccupancyOcTreeBa
     const Eigen::AlignedBox3d box(tree.getResolution() * low.cast<double>(),
                                   tree.getResolution() * high.cast<double>());
     if (!selection.region.isEmpty() && !selection.region.intersects(box)) continue;
+    // Leaves that are joined come one after another.
+    if (!boxes.empty() && boxes.back().min() == box.min() && boxes.back().max() == box.max()) {
+      continue;
+    }
     if (boxes.size() >= selection.limits.max_leaves) {
       throw std::invalid_argument("the tree has more occupied leaves than allowed, which are " +
                                   std::to_string(selection.limits.max_leaves) +

@@ -90,6 +90,24 @@ TEST(Octomap, DepthAndRegionAreChosen) {
   expect_equal(occupied_boxes(tree, selection), expected);
 }
 
+// Inner nodes said what they had said before leaves were updated lazily, and an occupied leaf was
+// lost.
+TEST(Octomap, AJoinedLeafIsOccupiedWhereALeafIs) {
+  octomap::OcTree tree(0.05);
+  tree.updateNode(octomap::point3d(0.2F, 0.0F, 0.0F), false);  // and the nodes above it are free
+  tree.updateNode(octomap::point3d(0.3F, 0.0F, 0.0F), true, true);
+  const Boxes fine = occupied_boxes(tree);
+  ASSERT_EQ(fine.size(), 1U);
+  for (unsigned depth = 1; depth <= 16; ++depth) {
+    OctomapSelection selection;
+    selection.max_depth = depth;
+    const Boxes coarse = occupied_boxes(tree, selection);
+    ASSERT_EQ(coarse.size(), 1U) << depth;
+    EXPECT_TRUE(coarse[0].contains(fine[0])) << depth;
+    EXPECT_NEAR(coarse[0].sizes().x(), 0.05 * (1 << (16 - depth)), 1e-9);
+  }
+}
+
 TEST(Octomap, AMapIsPlacedByItsPose) {
   octomap::OcTree tree(0.1);
   tree.updateNode(octomap::point3d(0.05F, 0.05F, 0.05F), true);
