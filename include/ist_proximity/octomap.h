@@ -11,6 +11,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -30,7 +31,7 @@ struct OctomapSelection {
   /// 1 to 16: leaves below this depth are joined, so that boxes are larger and fewer; a joined one
   /// is occupied where a leaf in it is. 0: all leaves as they are.
   unsigned max_depth = 0;
-  /// [m] in the map's frame: leaves that do not reach into it are left out. Empty: none
+  /// [m] in the map's frame, not NaN: leaves that do not reach into it are left out. Empty: none
   /// is.
   Eigen::AlignedBox3d region;
   OctreeLimits limits;  ///< more leaves, or farther ones, are refused (max_leaves, max_position)
@@ -39,7 +40,8 @@ struct OctomapSelection {
 /// The occupied leaves of a tree as solid boxes [m] in the map's frame M, as read_octree() gives
 /// them of the tree's message or file, to the bit. Unknown space holds no obstacle.
 /// @tparam Node  OcTreeNode, ColorOcTreeNode, or another that has an occupancy
-/// @throws std::invalid_argument when a limit is passed, or max_depth is over 16
+/// @throws std::invalid_argument when a limit is passed, max_depth is over 16, or the region or the
+///         occupancy of a leaf is NaN
 template <class Node>
 std::vector<Eigen::AlignedBox3d> occupied_boxes(const octomap::OccupancyOcTreeBase<Node>& tree,
                                                 const OctomapSelection& selection = {}) {
@@ -48,11 +50,17 @@ std::vector<Eigen::AlignedBox3d> occupied_boxes(const octomap::OccupancyOcTreeBa
     throw std::invalid_argument("max_depth is " + std::to_string(selection.max_depth) +
                                 "; a tree has " + std::to_string(tree.getTreeDepth()) + " levels.");
   }
+  if (selection.region.min().hasNaN() || selection.region.max().hasNaN()) {
+    throw std::invalid_argument("the region is not a number.");
+  }
   const unsigned depth = selection.max_depth > 0 ? selection.max_depth : tree.getTreeDepth();
   std::vector<Eigen::AlignedBox3d> boxes;
   const auto end = tree.end_leafs();
   // All leaves are asked: what an inner node says is old where leaves were updated lazily.
   for (auto leaf = tree.begin_leafs(); leaf != end; ++leaf) {
+    if (std::isnan(leaf->getLogOdds())) {
+      throw std::invalid_argument("the tree has a leaf whose log-odds value is not a number.");
+    }
     if (!tree.isNodeOccupied(*leaf)) continue;
     // Corners are whole numbers times the resolution, so that neighbours meet exactly.
     const int size = 1 << (tree.getTreeDepth() - std::min(leaf.getDepth(), depth));

@@ -7,6 +7,7 @@
 #include <octomap/OcTree.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <string>
@@ -106,6 +107,17 @@ TEST(Octomap, AJoinedLeafIsOccupiedWhereALeafIs) {
     EXPECT_TRUE(coarse[0].contains(fine[0])) << depth;
     EXPECT_NEAR(coarse[0].sizes().x(), 0.05 * (1 << (16 - depth)), 1e-9);
   }
+}
+
+// NaN is in no region and above no threshold: obstacles were left out.
+TEST(Octomap, WhatIsNotANumberIsRefused) {
+  auto tree = random_tree<octomap::OcTree>(0.05, 400);
+  OctomapSelection selection;
+  selection.region = Eigen::AlignedBox3d(Eigen::Vector3d(-1.0, -1.0, -1.0),
+                                         Eigen::Vector3d(1.0, 1.0, std::nan("")));
+  test::expect_says(test::argument_error([&] { occupied_boxes(tree, selection); }), "region");
+  tree.begin_leafs()->setLogOdds(std::nanf(""));
+  test::expect_says(test::argument_error([&] { to_obstacles(tree); }), "log-odds");
 }
 
 TEST(Octomap, AMapIsPlacedByItsPose) {
