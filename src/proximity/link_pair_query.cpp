@@ -79,6 +79,8 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
 
 bool LinkPairQuery::advance(int* steps) {
   if (is_finished_) return true;
+  // Links that are farther apart than numbers reach have no place in one another's frame.
+  if (!X_BA_.matrix().allFinite()) return is_finished_ = true;
   if (!surfaces_.run({range_, config_.tolerance, config_.relative_tolerance}, steps)) return false;
   decide_contact(steps);
   if (!are_apart_) search_spheres();

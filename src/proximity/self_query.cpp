@@ -50,6 +50,7 @@ struct SelfQuery::Impl {
   std::vector<std::shared_ptr<const LinkSurface>> surfaces;
   std::vector<std::unique_ptr<LinkPairQuery>> queries;  // by pair; null where a link is unusable
   std::vector<RigidPose> X_FL;                          // by link
+  std::vector<bool> has_pose;                           // by link: X_FL is known and finite
   std::vector<Waiting> queue;                           // a heap
 };
 
@@ -57,6 +58,7 @@ void SelfQuery::Impl::prepare(const CancelRequest& cancelled) {
   const auto& links = model->links;
   surfaces.resize(links.size());
   X_FL.resize(links.size());
+  has_pose.resize(links.size());
   for (const LinkPair& pair : pairs) {
     queries.emplace_back();
     if (std::max(pair.first, pair.second) >= links.size()) continue;
@@ -122,10 +124,12 @@ bool SelfQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>&
   Deadline deadline(impl.config.deadline);
   impl.statistics = {};
   for (std::size_t i = 0; i < X_FL.size(); ++i) {
-    if (known[i]) impl.X_FL[i] = nearest_rigid(X_FL[i]);
+    impl.has_pose[i] = known[i] && X_FL[i].matrix().allFinite();
+    if (impl.has_pose[i]) impl.X_FL[i] = nearest_rigid(X_FL[i]);
   }
-  const auto can_run = [&](std::size_t pair) {
-    return impl.queries[pair] && known[impl.pairs[pair].first] && known[impl.pairs[pair].second];
+  const auto can_run = [&](std::size_t i) {
+    const LinkPair& pair = impl.pairs[i];
+    return impl.queries[i] && impl.has_pose[pair.first] && impl.has_pose[pair.second];
   };
   impl.queue.clear();
   for (std::size_t i = 0; i < impl.pairs.size(); ++i) {

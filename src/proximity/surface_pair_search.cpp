@@ -101,7 +101,7 @@ double SurfacePairSearch::measure(SurfaceBvh::Slot a, SurfaceBvh::Slot b) {
     set_direction();
     update_prune_bound();
   }
-  return std::max(found.lower_bound - exact_rounding_, 0.0);
+  return std::max(0.0, found.lower_bound - exact_rounding_);  // of NaN: the first
 }
 
 // The distance of the surfaces along the line through the closest points.

@@ -177,6 +177,36 @@ TEST(SelfQuery, CoarsePackingsAreNoLargerThanTheirLinks) {
   }
 }
 
+// A pose of NaN was taken for one, and the search for parts that are near ended after minutes.
+TEST(SelfQuery, aPoseThatIsNoneMakesItsPairsUnknown) {
+  test::Rng rng(13);
+  const TriangleMesh lump = test::random_lump(&rng), soup = test::random_soup(&rng, 20);
+  const auto model = test::make_model({Box{{0.1, 0.1, 0.1}}, lump, soup}, 0.02);
+  SelfQuery query(model, {{0, 1}, {0, 2}, {1, 2}}, config());
+  const std::vector<bool> known(3, true);
+  std::vector<Eigen::Isometry3d> good(3, Eigen::Isometry3d::Identity());
+  good[1].translation().x() = good[2].translation().y() = 0.2;
+  std::vector<PairProximity> results;
+  query.run(good, known, &results);
+  const std::vector<PairProximity> before = results;
+  // Of the last two, each is finite and the one in the other's frame is not.
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(),
+                           std::numeric_limits<double>::infinity(), 1.5e308}) {
+    std::vector<Eigen::Isometry3d> X_FL = good;
+    X_FL[0].translation().x() = bad;
+    X_FL[1].translation().x() = X_FL[2].translation().x() = std::isfinite(bad) ? -bad : 0.2;
+    EXPECT_TRUE(query.run(X_FL, known, &results));
+    EXPECT_EQ(results[0].state, LinkState::kUnknown) << bad;
+    EXPECT_EQ(results[1].state, LinkState::kUnknown) << bad;
+    EXPECT_NE(results[2].state, LinkState::kUnknown) << bad;
+    query.run(good, known, &results);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      EXPECT_EQ(results[i].state, before[i].state) << bad;
+      EXPECT_NEAR(results[i].distance, before[i].distance, 0.002) << bad;
+    }
+  }
+}
+
 TEST(SelfQuery, aCancelledQueryKnowsNothing) {
   const auto model = test::make_model({Box{{0.1, 0.1, 0.1}}, Sphere{0.1}}, 0.02);
   SelfQuery query(model, {{0, 1}}, {}, [] { return true; });

@@ -86,7 +86,8 @@ class SelfQuery {
   SelfQuery(SelfQuery&&) noexcept;
   SelfQuery& operator=(SelfQuery&&) noexcept;
 
-  /// @param X_FL     by link: link frame -> fixed frame, rigid
+  /// @param X_FL     by link: link frame -> fixed frame, rigid; ignored where `known` is false. NaN
+  ///                 or infinity make the link's pairs UNKNOWN
   /// @param known    by link: false makes its pairs UNKNOWN. Where it or X_FL has another size than
   ///                 the model's links, every pair is UNKNOWN
   /// @param results  one per pair, overwritten; it allocates where it has not that many yet
