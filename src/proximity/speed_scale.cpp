@@ -86,9 +86,10 @@ double ramp(const SpeedScaleConfig& config, double stop, double free, double bou
   return config.slow_scale + (1.0 - config.slow_scale) * (bound - slow) / (free - slow);
 }
 
-// The largest k up to 1 with linear k + square k^2 <= rest, for factors that are not negative.
+// The largest k up to 1 with linear k + square k^2 <= rest, for factors that are not negative; 0
+// for NaN, such as of an obstacle that stands for the endless time until the link does.
 double largest_share(double linear, double square, double rest) {
-  if (!(rest > 0.0)) return 0.0;
+  if (!(rest > 0.0 && linear >= 0.0 && square >= 0.0)) return 0.0;
   const double root = std::sqrt(linear * linear + 4.0 * square * rest);
   return std::min(2.0 * rest / std::max(linear + root, 1e-9), 1.0);
 }

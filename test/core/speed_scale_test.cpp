@@ -224,6 +224,12 @@ TEST_F(OneLink, SeparationDistanceByReach) {
   EXPECT_EQ(run(input, 0.0).scale, 0.0);
   input.reach->speed = 1.0;
   EXPECT_EQ(run(input, 0.0).scale, 0.0);
+  // Nor does it beside an obstacle that stands: 0 m/s for an endless time is no number.
+  config.separation.obstacle_speed = input.obstacle_speed = 0.0;
+  EXPECT_EQ(run(input, 0.0).scale, 0.0);
+  EXPECT_EQ(run(input, 0.0).rule, SpeedRule::kSeparation);
+  input.reach = reach;
+  EXPECT_EQ(run(input, 0.0).scale, 1.0);
 }
 
 TEST(SpeedScale, TheLinkThatAllowsLeastDecides) {
