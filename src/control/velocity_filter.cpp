@@ -60,8 +60,8 @@ struct Factors {
       most = std::min(most, limit / slope);
     } else if (slope < 0.0) {
       least = std::max(least, limit / slope);
-    } else if (limit < 0.0) {
-      most = -1.0;
+    } else if (!(slope == 0.0 && limit >= 0.0)) {
+      most = -1.0;  // of NaN too, where a sum is too large for a number
     }
   }
 };
@@ -170,7 +170,8 @@ struct VelocityFilter::Impl {
   }
 
   // Whether the velocity x meets the rows, to the rounding of each row's own sum: a joint that is
-  // as fast as numbers are excuses no row that it is not in.
+  // as fast as numbers are excuses no row that it is not in. A sum that is too large for a number
+  // meets none.
   bool is_met(const ConstraintRows& rows) const {
     if (!x.allFinite()) return false;
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows.count); ++i) {
@@ -180,7 +181,8 @@ struct VelocityFilter::Impl {
         sum += std::abs(rows.G(i, k) * x[k]);
         sweep += rows.sweep(i, k) * std::abs(x[k]);
       }
-      if (!(approach <= rows.h[i] + kNegligible * (1.0 + sum) &&
+      if (!(std::isfinite(sum) && std::isfinite(sweep) &&
+            approach <= rows.h[i] + kNegligible * (1.0 + sum) &&
             sweep <= rows.sweep_limit[i] + kNegligible * (1.0 + sweep))) {
         return false;
       }

@@ -277,6 +277,26 @@ TEST(VelocityFilter, KeepsRowsBesideCommandsAsLargeAsNumbersAre) {
   }
 }
 
+// An infinite sum was within its own rounding of every limit, and the difference of two was none
+// of a row's concern: the command was given as it is.
+TEST(VelocityFilter, KeepsRowsWhoseSumsAreTooLargeForNumbers) {
+  constexpr double kHuge = 1.5e308;
+  VelocityFilter filter({{kInf, kInf}, {}, {}, {}});
+  ConstraintRows rows = empty_rows(1, 2);
+  rows.sweep.row(0) << 2.0, 1.0;
+  rows.sweep_limit[0] = 0.01;
+  for (const double other : {0.0, kHuge, -kHuge}) {
+    const FilterAnswer& answer = filter.run({kHuge, other}, {0.0, 0.0}, rows);
+    EXPECT_LE(2.0 * std::abs(answer.velocity[0]) + std::abs(answer.velocity[1]), 0.011) << other;
+  }
+  rows = empty_rows(1, 2);
+  rows.sweep_limit[0] = kInf;
+  rows.G.row(0) << 4.0, -4.0;
+  rows.h[0] = 0.01;
+  const FilterAnswer& answer = filter.run({kHuge, 0.5 * kHuge}, {0.0, 0.0}, rows);
+  EXPECT_LE(answer.velocity[0] - answer.velocity[1], 0.0025);
+}
+
 TEST(VelocityFilter, KeepsPositionLimits) {
   VelocityFilter filter({{1.0, 1.0}, {-1.0, -1.0}, {1.0, 1.0}, {}});
   ConstraintRows rows = empty_rows(0, 2);
