@@ -275,6 +275,16 @@ class PoseFaultsTest(pt.NodeTest):
         about_tf = [line for line in lines if "ball_link" in line or "TF_" in line or "tf2" in line]
         self.assertLess(len(about_tf), 10, "\n".join(about_tf))
 
+    def test_a_fixed_joint_that_moves_in_another_urdf(self):
+        """The sensor on it would be where the newest joint state has it, whatever its clouds' stamps."""
+        node = self.start(ARM.replace('"turn" type="continuous"', '"turn" type="fixed"'))
+        self.start_joints(moving=False)
+        node.wait_for_status(ProximityArray.OK)
+        rospy.set_param(self.namespace + "/robot_description", ARM)
+        self.assertTrue(node.reload().success)
+        message = node.wait_for_status(ProximityArray.NO_POSE, "'column' to 'base' was static, and ")
+        self.assertTrue(pt.all_unknown(message))
+
     def test_a_sensor_that_turns_while_tf_is_silent(self):
         """tf2 interpolates its pose evenly over the silence, in which it stood still at first."""
         begin = [np.inf]

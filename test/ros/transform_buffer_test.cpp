@@ -292,6 +292,12 @@ TEST(TransformBuffer, distrustsStaticTransformsThatMove) {
   EXPECT_NE(buffer.dispute("base", "optical"), "");
   buffer.add(transform("base", "camera", 0.0, 0.2), {"/b", second}, true, now);
   EXPECT_EQ(buffer.dispute("base", "optical"), "");
+
+  // A joint that was fixed until the URDF was read again.
+  buffer.add(transform("base", "slide", 0.0), "the URDF", true, now);
+  buffer.withdraw("the URDF");
+  buffer.add(transform("base", "slide", 100.0, 0.1), "/robot", false, now);
+  EXPECT_NE(buffer.dispute("base", "slide").find("/robot moves it now"), std::string::npos);
 }
 
 // A slow publisher beside a fast one, three publishers, and clocks that differ.
@@ -392,6 +398,7 @@ TEST(TransformBuffer, inGapsOfWhatHasMovedNoPoseIsKnown) {
 
   add(106.0, 9.0);
   EXPECT_NE(problem(105.0), "");
+
   buffer.clear();  // the clock has jumped back
   add(95.0, 0.0);
   add(95.4, 1.0);

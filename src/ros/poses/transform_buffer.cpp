@@ -191,8 +191,8 @@ void TransformBuffer::note_gap(const geometry_msgs::TransformStamped& transform,
   gaps_ += record->gaps.size();
 }
 
-/// Notes whether tf2 has a frame without time, and whether it moves all the same: what the URDF or
-/// joint states say is not looked up by its age. The caller holds mutex_.
+/// Notes whether tf2 has a frame without time, and whether it moves all the same. The caller holds
+/// mutex_.
 void TransformBuffer::note_turn(const geometry_msgs::TransformStamped& transform,
                                 const TransformPublisher& publisher, bool is_static,
                                 Record* record) {
@@ -206,7 +206,7 @@ void TransformBuffer::note_turn(const geometry_msgs::TransformStamped& transform
     if (!record->frozen.empty()) --disputes_;
     return record->frozen.clear();
   }
-  if (!record->is_static_in_tf || !record->frozen.empty() || !publisher.has_connection ||
+  if (!record->is_static_in_tf || !record->frozen.empty() ||
       !record->statements.statics().empty()) {
     return;
   }

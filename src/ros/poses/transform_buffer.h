@@ -32,8 +32,8 @@ namespace ist {
 /// The buffer also remembers which transforms were stamped ahead of the clock, so that their age
 /// counts from their receipt, and which frames two publishers state differently (see
 /// FrameStatements). Where a dispute ends, the static transform that is left counts. What was
-/// static stays so in tf2, for which it never is old: where /tf moves it from then on, its pose is
-/// in dispute until it is static again. Thread safe.
+/// static stays so in tf2, for which it never is old: where /tf or joint states move it from then
+/// on, its pose is in dispute until it is static again. Thread safe.
 class TransformBuffer : public tf2::BufferCore {
  public:
   /// @param cache_time   how long transforms are kept
