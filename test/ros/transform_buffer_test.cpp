@@ -399,6 +399,11 @@ TEST(TransformBuffer, inGapsOfWhatHasMovedNoPoseIsKnown) {
   add(106.0, 9.0);
   EXPECT_NE(problem(105.0), "");
 
+  // A frame of the same pose in another parent is elsewhere.
+  buffer.add(transform("hand", "camera", 106.0), a, false, ros::Time(106.0));
+  EXPECT_EQ(problem(106.0, "camera"), "");
+  EXPECT_NE(problem(105.5, "camera"), "");
+
   buffer.clear();  // the clock has jumped back
   add(95.0, 0.0);
   add(95.4, 1.0);

@@ -12,9 +12,14 @@ namespace {
 // A frame that is within this of its place before has stood still.
 constexpr double kStill = 1e-3;  // [m, rad]
 
-bool has_moved(const geometry_msgs::Transform& from, const geometry_msgs::Transform& to) {
+// Two poses in different parents are not compared.
+bool has_moved(const geometry_msgs::TransformStamped& from,
+               const geometry_msgs::TransformStamped& to) {
   Eigen::Isometry3d X_from, X_to;
-  if (!to_isometry(from, &X_from).empty() || !to_isometry(to, &X_to).empty()) return true;
+  if (from.header.frame_id != to.header.frame_id) return true;
+  if (!to_isometry(from.transform, &X_from).empty() || !to_isometry(to.transform, &X_to).empty()) {
+    return true;
+  }
   const Eigen::Isometry3d X = X_from.inverse() * X_to;
   return X.translation().norm() > kStill || Eigen::AngleAxisd(X.linear()).angle() > kStill;
 }
@@ -39,7 +44,7 @@ void TransformGaps::note(const geometry_msgs::TransformStamped& transform, doubl
                      [&](const Gap& gap) { return seconds_between(gap.end, stamp) > kept; }),
       gaps_.end());
   if (!newest_.header.stamp.isZero() && seconds_between(newest_.header.stamp, stamp) > longest &&
-      has_moved(newest_.transform, transform.transform)) {
+      has_moved(newest_, transform)) {
     gaps_.push_back({newest_.header.stamp, stamp});
   }
   newest_ = transform;
