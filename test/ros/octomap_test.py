@@ -11,8 +11,13 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import JointState, PointCloud2
 
+from ist_proximity.srv import QueryProximity
+
+CARRIER = """<link name="map"/>
+  <joint name="along" type="prismatic"><parent link="base"/><child link="map"/>
+    <axis xyz="1 0 0"/><limit lower="-5" upper="5" velocity="1" effort="1"/></joint>"""
 RESOLUTION = 0.05
 Octomap = genpy.dynamic.generate_dynamic(
     "octomap_msgs/Octomap",
@@ -135,10 +140,10 @@ class OctomapTest(pt.NodeTest):
         self.world.poses["map"] = ("base", pt.transform())
         self.world.start_tf()
 
-    def start(self, sources, **parameters):
+    def start(self, sources, extra="", **parameters):
         # Without a deadline: on a slow machine it would pass, which is not what these tests are about.
         parameters.update({"sources": sources, "query/tolerance": 0.0, "query/deadline": 0.0})
-        return super().start(**parameters)
+        return super().start(pt.urdf(extra), **parameters)
 
     def topic(self, **parameters):
         """A source on the topic `octomap`, and its publisher."""
@@ -229,6 +234,36 @@ class OctomapTest(pt.NodeTest):
         # The transform is lost, so the map's pose is not known.
         del self.world.poses["map"]
         node.wait_for_unknown(ProximityArray.NO_CLOUD, "from 'map' to 'base'")
+
+    def test_query_of_a_map_on_a_moving_link(self):
+        """It does not move as stated, and may be elsewhere than at its link's newest pose, which is late."""
+        begin, speed = [np.inf], 0.2
+
+        def X_base_map(t):  # towards the ball
+            return pt.transform((-speed * max(t - begin[0], 0.0), 0, 0))
+
+        def send():
+            stamp = rospy.Time.now()
+            X = X_base_map(stamp.to_sec())
+            self.world.publish_transforms([pt.transform_message("base", "map", X, stamp)])
+
+        del self.world.poses["map"]
+        self.world.repeat(4, send)
+        tree = Tree([((32, -32, -32), 32), ((32, 0, 0), 32)])
+        node = self.start({"room": self.topic(timeout=float("inf"))}, CARRIER, max_distance=2.0)
+        self.publisher.publish(message(tree))
+        node.wait_for(lambda m: m.sources and m.sources[0].status == 0, "the map")
+        query = rospy.ServiceProxy(node.name + "/query", QueryProximity)
+        state = JointState(name=["along"], position=[0.0])
+        begin[0] = rospy.Time.now().to_sec()
+        rospy.sleep(1.5)  # it is known how the link moves
+        for _ in range(50):
+            answer = query(states=[state])
+            self.assertTrue(answer.success, answer.message)
+            result = answer.results[0]
+            X = pt.inverse(X_base_map(result.header.stamp.to_sec()))
+            self.assertLess(pt.link(result, "ball_link").lower_bound, ball_truth(tree.boxes(), X) + 1e-3)
+            rospy.sleep(0.02)
 
     def test_timeout(self):
         """Like every source, a map is stale after half a second by default."""

@@ -192,13 +192,19 @@ void ProximityCycle::note_late_frames() {
   late_worlds_.begin();
   late_maps_.begin();
   const bool is_stated = pose_source_ && pose_source_->is_stated();
+  const auto is_carried = [&](const std::string& frame) {
+    const auto is_it = [&](const CarriedWorlds::Frame& one) {
+      return model_->kinematics->bodies()[one.body] == frame;
+    };
+    return is_stated && std::any_of(carried_.frames().begin(), carried_.frames().end(), is_it);
+  };
   for (const SourceSnapshot* source : selection_.selected()) {
     if (!source) continue;
     const std::size_t objects = source->surfaces ? source->world.X_FB.size() : 0;
     for (std::size_t i = 0; i < source->lags.size(); ++i) {
       const Lag& lag = source->lags[i];
-      // What the robot carries moves with the configuration that is stated.
-      if (is_stated && model_->kinematics && model_->kinematics->find_body(lag.frame)) continue;
+      // Objects that the robot carries move with the configuration that is stated; maps stay.
+      if (i < objects && is_carried(lag.frame)) continue;
       (i < objects ? late_worlds_ : late_maps_).add(lag);
     }
   }
