@@ -379,7 +379,7 @@ std::vector<double> CommandFilter::filter(const JointCommand& command, FilterSta
   state->status_text = why_not(command, now);
   for (PlacedAnswers* placed : {&obstacles_, &self_}) {
     if (!state->status_text.empty() || !placed->message) continue;
-    if (history_->at(placed->message->header.stamp, &placed->q)) continue;
+    if (history_->at(placed->message->header.stamp, &placed->q, &placed->moved)) continue;
     state->status_text = "the joint states do not reach back to the distances' stamp";
   }
   if (!state->status_text.empty()) {

@@ -11,6 +11,11 @@ namespace ist {
 namespace {
 
 constexpr double kKept = 1.0;  // [s] more than an answer's age may be
+// A node holds a joint that is stated apart at its last sample; the newest before an instant may
+// have come after the answer.
+constexpr std::ptrdiff_t kHeld = 2;
+
+constexpr auto is_before = [](const auto& sample, const ros::Time& t) { return sample.stamp < t; };
 
 }  // namespace
 
@@ -31,30 +36,46 @@ void JointHistory::add(const sensor_msgs::JointState& message, const ros::Time& 
     return;
   }
   const ros::Time& stamp = ahead > kClockResolution ? now : message.header.stamp;
+  ++messages_;
   for (std::size_t i = 0; i < message.name.size(); ++i) {
     const auto joint = kinematics_->find_joint(message.name[i]);
     if (!joint || !std::isfinite(message.position[i])) continue;
     std::deque<Sample>& samples = samples_[*joint];
     if (!samples.empty() && stamp < samples.back().stamp) continue;
     if (!samples.empty() && stamp == samples.back().stamp) samples.pop_back();
-    samples.push_back({stamp, message.position[i]});
+    samples.push_back({stamp, message.position[i], messages_});
     while (samples.size() > 1 && seconds_between(samples[1].stamp, stamp) > kKept) {
       samples.pop_front();
     }
   }
 }
 
-bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q) const {
+/// Whether all joints that are stated at an instant come in one message: of several, a node answers
+/// each.
+bool JointHistory::is_of_one_message(const ros::Time& stamp) const {
+  std::uint64_t message = 0;
+  for (const std::deque<Sample>& samples : samples_) {
+    const auto at = std::lower_bound(samples.begin(), samples.end(), stamp, is_before);
+    if (at == samples.end() || at->stamp != stamp) continue;
+    if (message != 0 && at->message != message) return false;
+    message = at->message;
+  }
+  return true;
+}
+
+bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q,
+                      std::vector<double>* moved) const {
   q->assign(samples_.size(), kNaN);
+  if (moved) moved->assign(samples_.size(), kNaN);
+  const bool is_one = moved && is_of_one_message(stamp);
   for (std::size_t j = 0; j < samples_.size(); ++j) {
     const std::deque<Sample>& samples = samples_[j];
     if (samples.empty()) continue;
-    const auto after =
-        std::lower_bound(samples.begin(), samples.end(), stamp,
-                         [](const Sample& sample, const ros::Time& t) { return sample.stamp < t; });
+    const auto after = std::lower_bound(samples.begin(), samples.end(), stamp, is_before);
+    const bool is_stated = after != samples.end() && after->stamp == stamp;
     if (after == samples.end()) {
       (*q)[j] = samples.back().q;
-    } else if (after->stamp == stamp) {
+    } else if (is_stated) {
       (*q)[j] = after->q;
     } else if (after == samples.begin()) {
       return false;
@@ -63,6 +84,13 @@ bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q) const {
       const double share =
           seconds_between(before.stamp, stamp) / seconds_between(before.stamp, after->stamp);
       (*q)[j] = before.q + share * (after->q - before.q);
+    }
+    if (!moved) continue;
+    (*moved)[j] = std::abs(samples.back().q - (*q)[j]);
+    if (is_stated && is_one) continue;
+    for (auto held = after; held != samples.begin() && after - held < kHeld;) {
+      --held;
+      (*moved)[j] = std::max((*moved)[j], std::abs(samples.back().q - held->q));
     }
   }
   return true;

@@ -3,6 +3,7 @@
 #include <ros/time.h>
 #include <sensor_msgs/JointState.h>
 
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <string>
@@ -27,8 +28,11 @@ class JointHistory {
 
   /// The positions [rad, m] by joint of the kinematics at an instant, between those that are stated
   /// of a joint by a straight line; the newest one after it. A joint that is not stated is NaN.
+  /// @param moved  may be null; [rad, m] by joint: how far its newest position is from that one,
+  ///               and from those before it that a node may have held until then
   /// @returns false where the history of a joint does not reach back to the instant
-  bool at(const ros::Time& stamp, std::vector<double>* q) const;
+  bool at(const ros::Time& stamp, std::vector<double>* q,
+          std::vector<double>* moved = nullptr) const;
 
   /// The newest position [rad, m] of a joint; NaN: not known.
   double newest(std::size_t joint) const;
@@ -45,13 +49,17 @@ class JointHistory {
   std::string late_joint(const ros::Time& now, double timeout) const;
 
  private:
+  bool is_of_one_message(const ros::Time& stamp) const;
+
   struct Sample {
     ros::Time stamp;
-    double q;  ///< [rad, m]
+    double q;               ///< [rad, m]
+    std::uint64_t message;  ///< its number
   };
 
   std::shared_ptr<const Kinematics> kinematics_;
   std::vector<std::deque<Sample>> samples_;  ///< by joint, in the order of their stamps
+  std::uint64_t messages_ = 0;               ///< that were taken
 };
 
 }  // namespace ist

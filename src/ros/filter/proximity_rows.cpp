@@ -125,19 +125,18 @@ void ProximityRows::place(const std::vector<double>& q, BodyPoses* poses) {
   kinematics_->place_bodies(joint_poses_, Eigen::Isometry3d::Identity(), poses);
 }
 
-double ProximityRows::motion(std::size_t row, const std::vector<double>& q_then,
-                             const std::vector<double>& q_now) const {
-  double moved = 0.0, turned = 0.0;
+double ProximityRows::motion(std::size_t row, const std::vector<double>& moved) const {
+  double way = 0.0, turned = 0.0;
   const auto& joints = builder_->joints();
   for (std::size_t c = 0; c < joints.size(); ++c) {
-    const double step = std::abs(q_now[joints[c]] - q_then[joints[c]]);
+    const double step = moved[joints[c]];
     const double sweep =
         builder_->rows().sweep(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(c));
     if (!(sweep > 0.0)) continue;
-    moved += sweep * step;
+    way += sweep * step;
     turned += turns_[joints[c]] * step;
   }
-  return turned < 0.5 ? moved / (1.0 - turned) : kInfinity;  // also where a position is not known
+  return turned < 0.5 ? way / (1.0 - turned) : kInfinity;  // also where a position is not known
 }
 
 // Moves a witness on a link along with it, from then to now.
@@ -163,7 +162,7 @@ const ConstraintRows& ProximityRows::rows(const PlacedAnswers& obstacles, const 
   builder_->begin(then_, of_obstacles);
   add_links();
   for (std::size_t row = 0; row < rows.count; ++row) {
-    results_[index(row)].lower_bound -= motion(row, obstacles.q, q_now);
+    results_[index(row)].lower_bound -= motion(row, obstacles.moved);
   }
   for (std::size_t i = 0; i < results_.size(); ++i) move(i, &results_[i].p_FCl);
   if (!pair_results_.empty()) {
@@ -171,7 +170,7 @@ const ConstraintRows& ProximityRows::rows(const PlacedAnswers& obstacles, const 
     builder_->begin(then_, config);
     builder_->add_pairs(pair_results_);
     for (std::size_t row = 0; row < rows.count; ++row) {
-      pair_results_[index(row)].lower_bound -= motion(row, self.q, q_now);
+      pair_results_[index(row)].lower_bound -= motion(row, self.moved);
     }
     for (std::size_t i = 0; i < pair_results_.size(); ++i) {
       move(builder_->pairs()[i].first, &pair_results_[i].p_FCa);

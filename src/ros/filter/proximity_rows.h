@@ -16,8 +16,9 @@ namespace ist {
 struct PlacedAnswers {
   ist_proximity::ProximityArray::ConstPtr message;         ///< null: none has come
   Eigen::Isometry3d X_RF = Eigen::Isometry3d::Identity();  ///< the message's frame -> root link
-  std::string fault;      ///< a sentence: why that is not known; empty: it is
-  std::vector<double> q;  ///< [rad, m] by joint of the kinematics, at the message's stamp
+  std::string fault;          ///< a sentence: why that is not known; empty: it is
+  std::vector<double> q;      ///< [rad, m] by joint of the kinematics, at the message's stamp
+  std::vector<double> moved;  ///< [rad, m] likewise: at most how far each has moved since then
 };
 
 /// The distance that a row rests on.
@@ -63,8 +64,7 @@ class ProximityRows {
   void add_links();
   void move(std::size_t link, Eigen::Vector3d* p_R) const;
   void place(const std::vector<double>& q, BodyPoses* poses);
-  double motion(std::size_t row, const std::vector<double>& q_then,
-                const std::vector<double>& q_now) const;
+  double motion(std::size_t row, const std::vector<double>& moved) const;
 
   std::shared_ptr<const Kinematics> kinematics_;
   ist_proximity::ProximityArray::ConstPtr obstacles_, self_;
