@@ -1,4 +1,4 @@
-// Queries of the robot's minimum, with relative tolerances and in batches, against brute force.
+// Queries of the robot's minimum and of a range without an end.
 
 #include <gtest/gtest.h>
 
