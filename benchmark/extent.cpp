@@ -126,7 +126,7 @@ class Scene {
     offset_ = -uniform(rng, 0.7, 1.8) * std::cos(tilt);
     for (std::size_t i = 0; i < 4; ++i) {
       const double z = uniform(rng, 0.7, 1.6);
-      centers_.emplace_back(uniform(rng, -0.3, 0.3) * z, uniform(rng, -0.25, 0.25) * z, z);
+      centers_.push_back({uniform(rng, -0.3, 0.3) * z, uniform(rng, -0.25, 0.25) * z, z});
       radii_.push_back(uniform(rng, 0.02, 0.12));
       shapes_.emplace_back(ist::Sphere{radii_[i]});
     }
@@ -208,22 +208,25 @@ std::string simulate(const std::string& name, int width, bool is_noisy,
   const ist::sim::DepthCamera camera(config, {});
   config.focal_length *= 50.0 / 49.0;
   const ist::sim::DepthCamera inner(config, {});  // without the outermost pixels
-  std::normal_distribution<double> normal;
   Tallies tallies;
   Rng rng(19);
   for (int i = 0; i < 40; ++i) {
     const Scene scene(&rng);
-    Points image = camera.picture(scene.bodies(), &rng);
+    const Vector3d axis = ist::test::random_vector(&rng, 1.0).normalized();
+    const double angle = uniform(&rng, -calibration.angle, calibration.angle);
+    const double offset = uniform(&rng, 0.0, calibration.offset);
+    const Vector3d way = ist::test::random_vector(&rng, 1.0).normalized();
+    const Eigen::Isometry3d X_FS =
+        Eigen::Translation3d(offset * way) * Eigen::Isometry3d(Eigen::AngleAxisd(angle, axis));
+    std::normal_distribution<double> normal;
+    Rng unused;
+    Points image = camera.picture(scene.bodies(), &unused);
     for (Eigen::Vector3f& p : image) {
       const auto range = static_cast<double>(p.norm());
-      if (is_noisy) p *= static_cast<float>(1.0 + sigma(range) / range * normal(rng));
+      if (!(range < kMaxRange)) continue;
+      const double error = sigma(range) * normal(rng);
+      if (is_noisy) p *= static_cast<float>(1.0 + error / range);
     }
-    const double angle = uniform(&rng, -calibration.angle, calibration.angle);
-    const Vector3d axis = ist::test::random_vector(&rng, 1.0).normalized();
-    const Vector3d off = ist::test::random_vector(&rng, 1.0).normalized();
-    const Eigen::Isometry3d X_FS =
-        Eigen::Translation3d(uniform(&rng, 0.0, calibration.offset) * off) *
-        Eigen::Isometry3d(Eigen::AngleAxisd(angle, axis));
     measure(image, static_cast<std::size_t>(width), X_FS, calibration,
             random_places(scene, inner, &rng), &tallies);
   }
