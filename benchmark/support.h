@@ -60,28 +60,21 @@ class CommandLine : public CLI::App {
   }
 
   /// Prints a table and puts it between its marks in the document.
-  /// @returns the program's exit code
+  /// @returns the program's exit code: 1 with a message where the document cannot be written
   int publish(const std::string& name, const std::string& table) const {
     std::printf("%s", table.c_str());
     std::fflush(stdout);
-    return document_.empty() ? 0 : write_table(document_, name, table);
-  }
-
-  /// @returns 1 with a message where the document cannot be written or lacks the marks, else 0
-  static int write_table(const std::string& document, const std::string& name,
-                         const std::string& table) {
-    std::string all = test::read_text(document);
+    if (document_.empty()) return 0;
+    std::string all = test::read_text(document_);
     const auto [first, last] = test::table_place(all, name);
     if (last != 0) {
       all.replace(first, last - first, table);
-      if (std::ofstream(document) << all) return 0;
+      if (std::ofstream(document_) << all) return 0;
     }
-    std::fprintf(stderr, "%s cannot be written, or lacks the marks of '%s'\n", document.c_str(),
+    std::fprintf(stderr, "%s cannot be written, or lacks the marks of '%s'\n", document_.c_str(),
                  name.c_str());
     return 1;
   }
-
-  const std::string& document() const { return document_; }
 
  private:
   std::string document_;
@@ -135,10 +128,6 @@ inline void for_each(std::size_t count, const std::function<void(std::size_t)>& 
 }
 
 using Clock = std::chrono::steady_clock;
-
-inline double microseconds_since(Clock::time_point start) {
-  return 1e6 * std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Measures the processor time of this thread, so that other load on the machine does not count.
 /// lap() returns [us] since the last call.
