@@ -46,7 +46,7 @@ class ProximityCycle {
   /// @param add_ons  their parts in the cycle, see make_cycles()
   ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
                  std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader,
-                 std::vector<std::unique_ptr<AddOnCycle>> add_ons);
+                 std::vector<std::unique_ptr<AddOnCycle>> add_ons = {});
 
   /// @param now      the ROS clock's time
   /// @param message  overwritten; its memory is kept, so that a message that was used by a cycle
