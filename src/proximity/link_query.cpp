@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "internal/geometry/float_rounding.h"
 #include "internal/geometry/numbers.h"
 
 namespace ist {
@@ -158,9 +159,10 @@ void LinkQuery::enter(const Obstacles& obstacles) {
   search.max_coordinate = std::max(search.max_coordinate, coordinate);
   const double lever = obstacles.X_OL.translation().norm() + extent + obstacles.drift_lever;
   search.index_error = std::max(search.index_error, pose_error(obstacles.drift, lever, range));
-  search.rounding =
-      std::max(search.rounding, kFloatError * (coordinate + range) +
-                                    pose_error(search.drift, extent, range) + search.index_error);
+  const double rounding = kFloatError * (coordinate + range) +
+                          pose_error(search.drift, extent, range) + search.index_error;
+  // A float: what is added to bounds in float is taken off in double.
+  search.rounding = std::max(search.rounding, static_cast<double>(round_up(rounding)));
 }
 template void LinkQuery::enter(const PointObstacles& obstacles);
 template void LinkQuery::enter(const BoxObstacles& obstacles);

@@ -268,6 +268,34 @@ TEST(CoherentQueries, BoundsHoldAmongManyPointsOfNearlyTheSameDistance) {
   }
 }
 
+// Beside the rounding of a range without end, 1 km, a float has lost the digits of a bound: another
+// point passed for the nearest one, and its distance for proven.
+TEST(CoherentQueries, BoundsKeepTheirDigitsWhereTheRangeHasNoEnd) {
+  test::Rng rng(41);
+  Points points;
+  for (int i = 0; i < 300; ++i) {
+    points.push_back(test::random_vector(&rng, 1.0).normalized() *
+                     test::uniform(&rng, 0.3, 0.3001));
+  }
+  const CloudSnapshot cloud = test::make_snapshot(points);
+  points = test::stored_points(cloud.index);
+  constexpr double kRadius = 0.1;
+  QueryConfig near, endless;
+  near.tolerance = endless.tolerance = 0.0;
+  endless.max_distance = kInfinity;
+  ProximityQuery query(test::make_model({Sphere{kRadius}}, 0.005), near);
+  std::vector<LinkProximity> results;
+  for (int step = 0; step < 200; ++step) {
+    const Eigen::Vector3d p = test::random_vector(&rng, 1e-4);
+    double truth = kInfinity;
+    for (const Eigen::Vector3d& q : points) truth = std::min(truth, (q - p).norm() - kRadius);
+    query.set_config(step % 2 == 0 ? near : endless);
+    query.run({Eigen::Isometry3d(Eigen::Translation3d(p))}, {true}, {&cloud}, &results);
+    ASSERT_LE(results[0].lower_bound, truth + 1e-12) << step;
+    ASSERT_NEAR(results[0].distance, truth, 1e-7) << step;
+  }
+}
+
 // A bound kept from another pose may say that nothing is deeper than the tolerance. Where the last
 // obstacle touches the link at exactly 0, that does not settle the query: another one may be
 // inside. All numbers are multiples of 2^-12 m, so that touch is exact.

@@ -1,7 +1,5 @@
 #include "proximity/coherence/front_pose.h"
 
-#include "internal/geometry/float_rounding.h"
-
 namespace ist {
 namespace {
 
@@ -27,7 +25,7 @@ bool FrontPose::move(std::uint64_t build_id, const Eigen::Isometry3d& X_OL,
   X_OL_ = X_OL;
   // A stored bound is lowered by the rounding of the search that stores it, and raised by that of
   // the search that reads it, which takes its own rounding off every bound in the end.
-  offset_ = round_up(displacement_) - rounding;
+  offset_ = displacement_ - static_cast<double>(rounding);
   return is_valid;
 }
 

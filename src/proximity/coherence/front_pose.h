@@ -34,14 +34,14 @@ class FrontPose {
 
   std::uint64_t build_id() const { return build_id_; }  ///< of the index; 0: there is no front
   /// [m] What is added to a bound of this search when it is stored.
-  float offset() const { return offset_; }
+  double offset() const { return offset_; }
 
  private:
   std::uint64_t build_id_ = 0;
   std::size_t first_size_ = 0;
   Eigen::Isometry3d X_OL_ = Eigen::Isometry3d::Identity();
   double displacement_ = 0.0;  ///< [m] since the first pose
-  float offset_ = 0.0F;
+  double offset_ = 0.0;
 };
 
 /// The fronts of one link, one for each of the last few indices.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "internal/bvh/box_node.h"
+#include "internal/geometry/float_rounding.h"
 #include "proximity/coherence/front_pose.h"
 
 namespace ist {
@@ -60,16 +61,16 @@ class SearchFront {
     is_full_ = is_full_ || size_ == kMaxParts;
     if (is_full_) return kMaxParts;
     parts_[size_] = part;
-    parts_[size_].bound += pose_.offset();
-    parts_[size_].outside += pose_.offset();
+    parts_[size_].bound = moved(part.bound, pose_.offset());
+    parts_[size_].outside = moved(part.outside, pose_.offset());
     return static_cast<std::uint32_t>(size_++);
   }
   /// Something with these bounds belongs to a part, too.
   /// @param part  by add(), in this search
   void lower(std::uint32_t part, float bound, float outside) {
     if (part == kMaxParts) return;
-    parts_[part].bound = std::min(parts_[part].bound, bound + pose_.offset());
-    parts_[part].outside = std::min(parts_[part].outside, outside + pose_.offset());
+    parts_[part].bound = std::min(parts_[part].bound, moved(bound, pose_.offset()));
+    parts_[part].outside = std::min(parts_[part].outside, moved(outside, pose_.offset()));
   }
   /// Removes parts.
   /// @param reopen  is called with each part, its bounds being those at the pose of this search;
@@ -79,8 +80,8 @@ class SearchFront {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < size_; ++i) {
       Part part = parts_[i];
-      part.bound -= pose_.offset();
-      part.outside -= pose_.offset();
+      part.bound = moved(part.bound, -pose_.offset());
+      part.outside = moved(part.outside, -pose_.offset());
       if (!reopen(part)) parts_[kept++] = parts_[i];
     }
     size_ = kept;
@@ -90,6 +91,12 @@ class SearchFront {
 
  private:
   static constexpr std::uint32_t kMaxParts = 512;  ///< a search that leaves more keeps no front
+
+  // Where the range has no end, roundings are so large that a float beside them has lost a bound's
+  // digits: a bound is never above what it was.
+  static float moved(float bound, double offset) {
+    return round_down(static_cast<double>(bound) + offset);
+  }
 
   std::vector<Part> parts_;
   std::size_t size_ = 0;
