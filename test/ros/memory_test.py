@@ -29,6 +29,14 @@ TURNING_BALL = """<robot name="turning"> <link name="base"/>
   <link name="ball_link"><collision><origin xyz="0.6 0 0"/><geometry><sphere radius="0.1"/></geometry></collision></link>
   <joint name="turn" type="continuous"><parent link="base"/><child link="ball_link"/><axis xyz="0 0 1"/></joint>
 </robot>"""
+# A ball that slides across the camera's axis, and a joint that moves nothing.
+SLIDING_BALL = """<robot name="sliding"> <link name="base"/> <link name="hand"/>
+  <link name="ball_link"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="slide" type="prismatic"><parent link="base"/><child link="ball_link"/>
+    <origin xyz="2 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="2" effort="1"/></joint>
+  <joint name="grip" type="prismatic"><parent link="base"/><child link="hand"/>
+    <limit lower="-1" upper="1" velocity="2" effort="1"/></joint>
+</robot>"""
 
 
 def patch(distance, half, step=0.008):
@@ -314,6 +322,41 @@ class MemoryTest(pt.NodeTest):
         self.remember(10)
         for message in self.node.messages[begin:]:
             self.assertLess(self.ball(message).lower_bound, to_side + 2 * VOXEL)
+
+    # What a joint may have moved since its last sample comes off the distance from unseen space, too.
+    def test_unknown_space_beside_a_joint_that_is_late(self):
+        place = lambda t: abs(t % 1.2 - 0.6) - 0.3  # 1 m/s to and fro
+        joints = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
+        stated = set()
+
+        def send_slide():
+            stamp = rospy.Time.now()
+            stated.add(stamp)
+            joints.publish(joint_state({"slide": place(stamp.to_sec())}, stamp))
+
+        self.world.points = patch(2.4, 0.72, 0.015)
+        self.world.repeat(10, send_slide)
+        self.world.repeat(100, lambda: joints.publish(joint_state({"grip": 0.0})))
+        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
+        parameters = {"pose_source": "joint_states", "unknown_space": "obstacle", "memory": memory}
+        parameters.update({"max_distance": 2.0, "links": ["ball_link"]})
+        self.node = pt.ProximityNode(self.namespace, parameters, SLIDING_BALL)
+        is_seen = lambda m: m.links and self.ball(m).unseen_distance > 0.1  # noqa: E731
+        self.node.wait_for(is_seen, "seen space about the ball")
+        begin = len(self.node.messages)
+        self.node.wait_until(lambda: len(self.node.messages) > begin + 1000, "1000 messages")
+        known = [m for m in self.node.messages[begin:] if self.ball(m).state != LinkProximity.UNKNOWN]
+        compared = 0
+        for fresh, late in ((m, l) for m in known if m.header.stamp in stated for l in known):
+            t, t_late = fresh.header.stamp.to_sec(), late.header.stamp.to_sec()
+            if late.header.stamp in stated or not 0.0 < t - t_late < 0.1:
+                continue
+            if not place(t) / place(t_late) > 1.0 or (t - 0.3) // 0.6 != (t - 0.6) // 0.6:
+                continue  # only on the way out, and not where it has just turned
+            compared += 1
+            way = 1.1 * self.ball(fresh).unseen_distance + 0.02 + t - t_late
+            self.assertLess(self.ball(late).unseen_distance, way)
+        self.assertGreater(compared, 20)
 
     # The memory is in a frame in which the robot drives. No cloud comes while it does.
     def test_unknown_space_stands_still_while_the_robot_drives(self):

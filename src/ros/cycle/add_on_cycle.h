@@ -30,7 +30,9 @@ class AddOnCycle {
                           const std::string& fixed_frame, const LiveConfig& config) = 0;
 
   /// Adds what the last run() found of a link to its answer, which is not UNKNOWN.
-  virtual void fill(std::size_t link, ist_proximity::LinkProximity* message) const = 0;
+  /// @param moved  [m] how far the link's points may have moved from its pose
+  virtual void fill(std::size_t link, double moved,
+                    ist_proximity::LinkProximity* message) const = 0;
   /// Adds what the last run() found of a link to what is drawn.
   /// @param place  of the link in the message
   virtual void draw(std::size_t link, std::size_t place, MarkerScene* scene) const = 0;

@@ -28,6 +28,10 @@ class LateJoints {
   /// @param known    by link: whether it has a pose
   Span<const double> update(PoseSource* source, const ros::Time& instant,
                             const std::vector<bool>& known);
+  /// [m] The same, of the last update().
+  Span<const double> moved() const {
+    return lags_.empty() ? Span<const double>() : Span<const double>(moved_);
+  }
 
   /// [m] How much nearer to each other two links of the robot may have come since: joints that move
   /// both alike do not count. Of the last update().

@@ -303,6 +303,7 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
 void ProximityCycle::fill_links(ProximityArray* message) {
   const std::string nowhere;
   if (future_.is_stated()) future_.update(pose_source_.get(), poses_.stamp);
+  const Span<const double> moved = late_joints_.moved();
   message->links.resize(model_->monitored.size());
   for (std::size_t k = 0; k < message->links.size(); ++k) {
     const std::size_t i = model_->monitored[k];
@@ -315,8 +316,9 @@ void ProximityCycle::fill_links(ProximityArray* message) {
                 source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
                 &message->links[k]);
     assign_box(boxes_[i].box_L, &message->links[k]);
+    const double late = moved.empty() ? 0.0 : moved[i];
     for (std::size_t n = 0; n < add_ons_.size() && result.state != LinkState::kUnknown; ++n) {
-      add_ons_[n]->fill(i, &message->links[k]);
+      add_ons_[n]->fill(i, late, &message->links[k]);
     }
     message->links[k].robot_future = future_.left_of(k, message->links[k].lower_bound);
   }

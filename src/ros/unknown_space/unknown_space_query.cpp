@@ -76,9 +76,11 @@ std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vec
   return "";
 }
 
-void UnknownSpaceQuery::fill(std::size_t link, ist_proximity::LinkProximity* message) const {
+void UnknownSpaceQuery::fill(std::size_t link, double moved,
+                             ist_proximity::LinkProximity* message) const {
   const UnknownSpaceAnswer& answer = answers_[link];
-  assign_unknown_space(answer.seen, answer.lower_bound, answer.direction, is_obstacle_, message);
+  assign_unknown_space(answer.seen, answer.lower_bound - moved, answer.direction, is_obstacle_,
+                       message);
 }
 
 void UnknownSpaceQuery::draw(std::size_t link, std::size_t place, MarkerScene* scene) const {

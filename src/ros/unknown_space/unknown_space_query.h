@@ -39,7 +39,7 @@ class UnknownSpaceQuery : public AddOnCycle {
   std::string run(const StampedLinkPoses& poses, const std::vector<bool>& known,
                   const std::string& fixed_frame, const LiveConfig& config) override;
 
-  void fill(std::size_t link, ist_proximity::LinkProximity* message) const override;
+  void fill(std::size_t link, double moved, ist_proximity::LinkProximity* message) const override;
   void draw(std::size_t link, std::size_t place, MarkerScene* scene) const override;
 
  private:
