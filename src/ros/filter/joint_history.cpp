@@ -11,9 +11,10 @@ namespace ist {
 namespace {
 
 constexpr double kKept = 1.0;  // [s] more than an answer's age may be
-// A node holds a joint that is stated apart at its last sample; the newest before an instant may
-// have come after the answer.
+// A node holds a joint that is stated apart at its last sample, which may be so much older than the
+// answer's stamp (see JointPoseSource): two intervals and a time [s].
 constexpr std::ptrdiff_t kHeld = 2;
+constexpr double kLate = 0.05;
 
 constexpr auto is_before = [](const auto& sample, const ros::Time& t) { return sample.stamp < t; };
 
@@ -88,7 +89,11 @@ bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q,
     if (!moved) continue;
     (*moved)[j] = std::abs(samples.back().q - (*q)[j]);
     if (is_stated && is_one) continue;
-    for (auto held = after; held != samples.begin() && after - held < kHeld;) {
+    const auto oldest = std::lower_bound(samples.begin(), after, stamp,
+                                         [](const Sample& sample, const ros::Time& t) {
+                                           return seconds_between(sample.stamp, t) > kLate;
+                                         });
+    for (auto held = after; held != samples.begin() && oldest - held < kHeld;) {
       --held;
       (*moved)[j] = std::max((*moved)[j], std::abs(samples.back().q - held->q));
     }
