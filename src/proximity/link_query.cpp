@@ -161,8 +161,9 @@ void LinkQuery::enter(const Obstacles& obstacles) {
   search.index_error = std::max(search.index_error, pose_error(obstacles.drift, lever, range));
   const double rounding = kFloatError * (coordinate + range) +
                           pose_error(search.drift, extent, range) + search.index_error;
-  // A float: what is added to bounds in float is taken off in double.
-  search.rounding = std::max(search.rounding, static_cast<double>(round_up(rounding)));
+  // A float, as far as there are any: what is added to bounds in float is taken off in double.
+  const auto as_float = static_cast<double>(round_up(rounding));
+  search.rounding = std::max(search.rounding, std::isfinite(as_float) ? as_float : rounding);
 }
 template void LinkQuery::enter(const PointObstacles& obstacles);
 template void LinkQuery::enter(const BoxObstacles& obstacles);
