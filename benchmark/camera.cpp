@@ -5,8 +5,8 @@
 // other libraries. As Markdown tables.
 //
 // One thread, processor time of that thread, without ROS. The frames of the test data
-// (IST_PROXIMITY_DATA, or ../shared/data); the robot moves through them. scripts/benchmark calls
-// it.
+// (IST_PROXIMITY_DATA, or ../shared/data), or the synthetic one without them; the robot moves
+// through them. scripts/benchmark calls it.
 
 #include <array>
 #include <memory>
@@ -197,7 +197,10 @@ int main(int argc, char** argv) {
   ist::benchmark::CommandLine line("The cost of a camera as the node has it.");
   line.add_option("cache", cache, "Folder that keeps packings")->required();
   line.read(argc, argv);
-  const DataSet set = ist::benchmark::kinect_data(ist::benchmark::data_or_exit(), cache);
+  const auto recorded = ist::test::data_dir();
+  if (!recorded) std::fprintf(stderr, "synthetic scene: %s\n", ist::test::kNoData.c_str());
+  const DataSet set = recorded ? ist::benchmark::kinect_data(*recorded, cache)
+                               : ist::benchmark::synthetic_data(cache);
   const Times ours = time_ours(set, cache);
   std::string table =
       "| method | image | first answer, beside the cycles | 33 cycles: distances | repulsion | "

@@ -2,8 +2,8 @@
 // its witness points. Ours is compared with the alternatives, as CSV.
 //
 // One thread, processor time of that thread. Every answer is checked against the exact truth before
-// anything is timed. Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. scripts/benchmark
-// calls it.
+// anything is timed. Data: a synthetic scene, and the test data where they are (IST_PROXIMITY_DATA,
+// or ../shared/data). scripts/benchmark calls it.
 
 #include <algorithm>
 #include <cmath>
@@ -124,8 +124,9 @@ class Trial {
   std::vector<Answer> answers_;
 };
 
-void write(const Method& method, const Result& r, CsvFile* csv) {
-  csv->add("method", method.name)
+void write(const std::string& data, const Method& method, const Result& r, CsvFile* csv) {
+  csv->add("data", data)
+      .add("method", method.name)
       .add("kind", method.kind)
       .add("spheres", method.spheres)
       .add("max_error_mm", 1e3 * method.max_error)
@@ -169,15 +170,15 @@ bool run(const DataSet& set, const std::string& only, CsvFile* csv) {
   bool all_right = true;
   for (const auto& method : all_methods(set.robot)) {
     if (method->name.find(only) == std::string::npos) continue;
-    std::fprintf(stderr, "%s, max_error %g mm, tolerance %g mm\n", method->name.c_str(),
-                 1e3 * method->max_error, 1e3 * method->tolerance);
+    std::fprintf(stderr, "%s: %s, max_error %g mm, tolerance %g mm\n", set.name.c_str(),
+                 method->name.c_str(), 1e3 * method->max_error, 1e3 * method->tolerance);
     Result result;
     for (const Scene& scene : set.scenes) Trial(set, scene, method.get(), &result).run();
     if (result.failures > 0) {
       std::fprintf(stderr, "  %zu of %zu answers are WRONG\n", result.failures, result.answers);
       all_right = false;
     }
-    write(*method, result, csv);
+    write(set.name, *method, result, csv);
   }
   return all_right;
 }
@@ -188,11 +189,26 @@ bool run(const DataSet& set, const std::string& only, CsvFile* csv) {
 int main(int argc, char** argv) {
   using namespace ist::benchmark;
   std::string path, cache, only;
+  std::vector<std::string> names = {"synthetic", "kinect"};
   CommandLine line("Distances of links to a depth image, beside other libraries.");
   line.add_option("result", path, "CSV file")->required();
   line.add_option("cache", cache, "Folder that keeps packings")->required();
+  line.add_option("data", names,
+                  "What to measure with; recorded data that are not there are left out")
+      ->check(CLI::IsMember({"synthetic", "kinect"}));
   line.add_option("--only", only, "Methods whose names contain this");
   line.read(argc, argv);
   CsvFile csv(path);
-  return run(kinect_data(data_or_exit(), cache), only, &csv) ? 0 : 1;
+  const auto recorded = ist::test::data_dir();
+  bool all_right = true;
+  for (const std::string& name : names) {
+    if (name == "synthetic") {
+      all_right = run(synthetic_data(cache), only, &csv) && all_right;
+    } else if (recorded) {
+      all_right = run(kinect_data(*recorded, cache), only, &csv) && all_right;
+    } else {
+      std::fprintf(stderr, "kinect: %s\n", ist::test::kNoData.c_str());
+    }
+  }
+  return all_right ? 0 : 1;
 }

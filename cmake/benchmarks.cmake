@@ -45,7 +45,7 @@ foreach(source IN LISTS benchmark_sources)
   get_filename_component(name ${source} NAME_WE)
   file(GLOB parts CONFIGURE_DEPENDS benchmark/${name}/*.cpp)
   if(name STREQUAL peers)
-    list(FILTER parts EXCLUDE REGEX "/(embree|fcl|nanoflann|synthetic)\\.cpp$")
+    list(FILTER parts EXCLUDE REGEX "/(embree|fcl|nanoflann)\\.cpp$")
   endif()
   ist_proximity_benchmark(${name} ${source} ${parts})
 endforeach()
@@ -106,7 +106,7 @@ ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)
 
 # The cost of a camera, beside some of them. The robot's own points are dropped with CGAL's hulls.
 target_sources(benchmark_camera PRIVATE
-  ${recorded_scenes} benchmark/peers/image_pyramid.cpp)
+  ${recorded_scenes} benchmark/peers/synthetic.cpp benchmark/peers/image_pyramid.cpp)
 find_path(IST_PROXIMITY_cgal_INCLUDE_DIR CGAL/AABB_tree.h)
 find_library(IST_PROXIMITY_gmp_LIBRARY gmp)
 mark_as_advanced(IST_PROXIMITY_cgal_INCLUDE_DIR IST_PROXIMITY_gmp_LIBRARY)

@@ -20,8 +20,7 @@ std::vector<Poses> recorded_motion(const std::filesystem::path& data, std::size_
 }
 
 DataSet kinect_data(const std::filesystem::path& data, const std::string& cache_directory) {
-  DataSet set;
-  set.robot.cache_directory = cache_directory;
+  DataSet set{"kinect", {{}, cache_directory}, {}, {}};
   for (const LinkDescription& link : test::panda_description(data).links) {
     set.robot.meshes.push_back(std::get<TriangleMesh>(link.geometry.front().shape));
   }

@@ -70,6 +70,7 @@ struct Robot {
 };
 
 struct DataSet {
+  std::string name;
   Robot robot;
   std::vector<Scene> scenes;
   std::vector<Poses> motion;  ///< 1 ms apart
@@ -77,6 +78,9 @@ struct DataSet {
 
 /// A Franka Panda among three Kinect frames, with exact truth.
 DataSet kinect_data(const std::filesystem::path& data, const std::string& cache_directory);
+
+/// Tori, cylinders and the like above the synthetic frame's table, without contact; exact truth.
+DataSet synthetic_data(const std::string& cache_directory);
 
 /// The first poses of the Panda's recorded motion.
 std::vector<Poses> recorded_motion(const std::filesystem::path& data, std::size_t count);
