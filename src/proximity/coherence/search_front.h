@@ -92,8 +92,8 @@ class SearchFront {
  private:
   static constexpr std::uint32_t kMaxParts = 512;  ///< a search that leaves more keeps no front
 
-  // Where the range has no end, roundings are so large that a float beside them has lost a bound's
-  // digits: a bound is never above what it was.
+  // The sum is in double: where the range has no end, roundings are so large that a float beside
+  // them would lose a bound's digits. It is rounded down.
   static float moved(float bound, double offset) {
     return round_down(static_cast<double>(bound) + offset);
   }

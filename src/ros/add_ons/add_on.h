@@ -26,7 +26,7 @@ class AddOn {
  public:
   virtual ~AddOn() = default;
 
-  /// Its part in the cycles of a model; null: none. Thread safe.
+  /// Makes its part in the cycles of a model; null: it has none. Thread safe.
   /// @param reader  the kind of cycle, see CloudSelection
   virtual std::unique_ptr<AddOnCycle> make_cycle(const ModelState& /*model*/,
                                                  CloudSelection::Reader /*reader*/) {
@@ -46,7 +46,7 @@ class AddOn {
 
 using AddOns = std::vector<std::unique_ptr<AddOn>>;
 
-/// What of the node add-ons work with. All of it outlives them.
+/// The parts of the node that add-ons work with. They outlive all add-ons.
 struct AddOnContext {
   ros::NodeHandle nh, private_nh;
   const ServerConfig& config;

@@ -93,7 +93,7 @@ void check_unknown_space(ParameterReader* reader, const ServerConfig& config) {
   if (first == nullptr) refuse("a memory says what has been seen; set ~memory/enabled");
 }
 
-/// What is configured needs the add-on that does it.
+/// A parameter needs the add-on that it is of.
 void check_add_ons(ParameterReader* reader, const ServerConfig& config) {
   const auto check = [&](const char* add_on, const char* parameter, bool is_wanted) {
     const std::vector<std::string>& built = built_add_ons();

@@ -11,7 +11,7 @@ namespace {
 // Unknown space is known to a voxel, so that closer bounds would say no more.
 constexpr double kTolerance = 0.01;         // [m]
 constexpr double kRelativeTolerance = 0.1;  // of the distance
-// Of a cycle's deadline: unknown space needs coarse bounds only.
+// Unknown space needs coarse bounds only, and gets this share of a cycle's deadline.
 constexpr double kUnknownShare = 0.2;
 
 QueryConfig coarse(QueryConfig config) {
