@@ -99,17 +99,9 @@ class Search {
       bounds_.place_box(box.min.data(), box.max.data(), &root);
       return visit(root, kMayBeInside);
     }
-    in_.front->remove_if([this](const SearchFront::Part& part) {
-      // Near holes a point may come to be inside though no surface has come nearer.
-      const bool is_outside = link_.is_closed || part.outside > 0.0F;
-      const bool is_pruned = part.bound >= limit_ && is_outside;
-      if (is_pruned) {
-        lower(part.bound, part.outside);
-      } else {
-        push_part(part);
-      }
-      return !is_pruned;
-    });
+    const SearchFront::LeastBounds left = in_.front->remove_below(
+        limit_, link_.is_closed, [this](const SearchFront::Part& part) { push_part(part); });
+    lower(left.bound, left.outside);
   }
 
   void push_part(const SearchFront::Part& part) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "internal/bvh/box_node.h"
@@ -30,6 +31,12 @@ class SearchFront {
     std::int32_t child;    ///< the node, or the tile if negative
     std::uint32_t slots;   ///< bit k: child k of the node
     float min[3], max[3];  ///< [m] box about all of `child`, in the index's frame
+  };
+
+  /// The least bounds of some parts; +inf: there are none.
+  struct LeastBounds {
+    float bound = std::numeric_limits<float>::infinity();    ///< [m]
+    float outside = std::numeric_limits<float>::infinity();  ///< [m]
   };
 
   SearchFront() : parts_(kMaxParts) {}
@@ -61,30 +68,49 @@ class SearchFront {
     is_full_ = is_full_ || size_ == kMaxParts;
     if (is_full_) return kMaxParts;
     parts_[size_] = part;
-    parts_[size_].bound = moved(part.bound, pose_.offset());
-    parts_[size_].outside = moved(part.outside, pose_.offset());
+    parts_[size_].bound = stored(part.bound);
+    parts_[size_].outside = stored(part.outside);
     return static_cast<std::uint32_t>(size_++);
   }
   /// Something with these bounds belongs to a part, too.
   /// @param part  by add(), in this search
   void lower(std::uint32_t part, float bound, float outside) {
     if (part == kMaxParts) return;
-    parts_[part].bound = std::min(parts_[part].bound, moved(bound, pose_.offset()));
-    parts_[part].outside = std::min(parts_[part].outside, moved(outside, pose_.offset()));
+    parts_[part].bound = std::min(parts_[part].bound, stored(bound));
+    parts_[part].outside = std::min(parts_[part].outside, stored(outside));
   }
-  /// Removes parts.
-  /// @param reopen  is called with each part, its bounds being those at the pose of this search;
-  ///                returns whether it is to be looked at again and removed
+  /// Removes the parts that are to be looked at again: those whose bound is below a limit and, near
+  /// holes, those that may be inside.
+  /// @param limit      [m] at the pose of this search
+  /// @param is_closed  whether the link's surface is: where a point has come to be inside, a
+  /// surface
+  ///                   has come nearer
+  /// @param reopen     is called with each of them, its bounds being those at the pose of this
+  /// search
+  /// @returns the bounds of the parts that stay, at the pose of this search
   template <class Reopen>
-  void remove_if(const Reopen& reopen) {
+  LeastBounds remove_below(float limit, bool is_closed, const Reopen& reopen) {
+    // Nearly all parts stay. They are compared as stored, and their least bound is moved at the
+    // end.
+    LeastBounds least;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < size_; ++i) {
+      // Written so that a bound of NaN is looked at again.
+      if (difference(parts_[i].bound) >= static_cast<double>(limit) &&
+          (is_closed || difference(parts_[i].outside) > 0.0)) {
+        least.bound = std::min(least.bound, parts_[i].bound);
+        least.outside = std::min(least.outside, parts_[i].outside);
+        if (kept != i) parts_[kept] = parts_[i];
+        ++kept;
+        continue;
+      }
       Part part = parts_[i];
-      part.bound = moved(part.bound, -pose_.offset());
-      part.outside = moved(part.outside, -pose_.offset());
-      if (!reopen(part)) parts_[kept++] = parts_[i];
+      part.bound = round_down(difference(part.bound));
+      part.outside = round_down(difference(part.outside));
+      reopen(part);
     }
     size_ = kept;
+    return {round_down(difference(least.bound)), round_down(difference(least.outside))};
   }
 
   std::size_t memory() const { return parts_.capacity() * sizeof(Part); }  ///< [bytes]
@@ -92,11 +118,12 @@ class SearchFront {
  private:
   static constexpr std::uint32_t kMaxParts = 512;  ///< a search that leaves more keeps no front
 
-  // The sum is in double: where the range has no end, roundings are so large that a float beside
-  // them would lose a bound's digits. It is rounded down.
-  static float moved(float bound, double offset) {
-    return round_down(static_cast<double>(bound) + offset);
+  // Sums are in double: where the range has no end, roundings are so large that a float beside them
+  // would lose a bound's digits.
+  float stored(float bound) const {
+    return round_down(static_cast<double>(bound) + pose_.offset());
   }
+  double difference(float stored) const { return static_cast<double>(stored) - pose_.offset(); }
 
   std::vector<Part> parts_;
   std::size_t size_ = 0;

@@ -6,16 +6,12 @@
 #include "internal/geometry/numbers.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
+#include "ros/poses/joint_lag.h"
 
 namespace ist {
 namespace {
 
 constexpr double kKept = 1.0;  // [s] more than an answer's age may be
-// A node holds a joint that is stated apart at its last sample, which may be so much older than the
-// answer's stamp (see JointPoseSource): two intervals and a time [s].
-constexpr std::ptrdiff_t kHeld = 2;
-constexpr double kLate = 0.05;
-
 constexpr auto is_before = [](const auto& sample, const ros::Time& t) { return sample.stamp < t; };
 
 }  // namespace
@@ -91,9 +87,9 @@ bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q,
     if (is_stated && is_one) continue;
     const auto oldest = std::lower_bound(samples.begin(), after, stamp,
                                          [](const Sample& sample, const ros::Time& t) {
-                                           return seconds_between(sample.stamp, t) > kLate;
+                                           return seconds_between(sample.stamp, t) > kLag;
                                          });
-    for (auto held = after; held != samples.begin() && oldest - held < kHeld;) {
+    for (auto held = after; held != samples.begin() && oldest - held < kHeldIntervals;) {
       --held;
       (*moved)[j] = std::max((*moved)[j], std::abs(samples.back().q - held->q));
     }

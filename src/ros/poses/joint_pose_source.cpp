@@ -7,15 +7,12 @@
 
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
+#include "ros/poses/joint_lag.h"
 #include "ros/poses/tf_pose_source.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
 namespace {
-
-// [s] A sample that is late by less than this is taken for one that comes in time, as publishers
-// on one machine may be so late. What is allowed here makes poses older than header.stamp says.
-constexpr double kLag = 0.05;
 
 constexpr double kStampResolution = 1e-3;  // [s]
 
@@ -75,7 +72,7 @@ PoseProblem JointPoseSource::problem_of(std::size_t joint, const ros::Time& now)
 
 /// Whether a joint is later than its samples usually are: by more than one and a half times its
 /// usual spacing behind a joint that came in the same message before; behind the newest one, whose
-/// publisher may be another, by more than twice the spacing and kLag.
+/// publisher may be another, by more than kHeldIntervals times the spacing and kLag.
 /// @returns empty, or a sentence
 std::string JointPoseSource::is_late(std::size_t joint, std::size_t newest) const {
   const JointPosition& position = positions_[joint];
@@ -97,7 +94,7 @@ std::string JointPoseSource::is_late(std::size_t joint, std::size_t newest) cons
     return sentence(position.companion, behind);
   }
   spacing = position.spacing > 0.0 ? position.spacing : positions_[newest].spacing;
-  if (lag > 2.0 * spacing + kLag) return sentence(newest, lag);
+  if (lag > kHeldIntervals * spacing + kLag) return sentence(newest, lag);
   return "";
 }
 
