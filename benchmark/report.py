@@ -9,6 +9,7 @@ import argparse
 import csv
 import math
 import re
+import sys
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -20,6 +21,8 @@ NAMES = {"kinect": "Kinect frames", "synthetic": "Synthetic scene"}
 def read(path):
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    if not rows:
+        sys.exit(f"{path} has no rows: nothing was measured")
     for row in rows:
         for key, value in row.items():
             try:
