@@ -52,6 +52,7 @@ void LinkBounds::bound_corners(const Entry& box, Corners* corners) const {
 
 float LinkBounds::bound_boxes(const BoxRows& boxes, const Entry& parent, const Corners* corners,
                               float enough, Bounds* bounds) const {
+  if (are_beyond_sphere(boxes, enough, bounds)) return kFarAway;
   if (link_.field != nullptr) {
     return bound_boxes_by_field(link_, boxes, parent, corners, bounds);
   }
@@ -84,6 +85,29 @@ float LinkBounds::bound_points(const PointTile& tile, const Entry& box, float en
   }
   bound_by_tree(tile.count, true, enough, bounds);
   return kFarAway;
+}
+
+// Bounds boxes by the link's root sphere, if that is enough for all of them.
+bool LinkBounds::are_beyond_sphere(const BoxRows& boxes, float enough, Bounds* bounds) const {
+  if (link_.radius == std::numeric_limits<float>::infinity()) return false;
+  for (int k = 0; k < kBoxWidth; ++k) {
+    float square = 0.0F;
+    for (int i = 0; i < 3; ++i) {
+      const float below = boxes.min[i][k] - link_.center[i];
+      const float above = link_.center[i] - boxes.max[i][k];
+      const float beyond = std::max(std::max(below, above), 0.0F);
+      square += beyond * beyond;
+    }
+    bounds->distance[k] = std::sqrt(square) - link_.radius;
+  }
+  // Written so that a bound of NaN is not enough.
+  if (!std::all_of(bounds->distance, bounds->distance + boxes.count,
+                   [&](float bound) { return bound >= enough; })) {
+    return false;
+  }
+  std::copy_n(bounds->distance, kBoxWidth, bounds->outside);
+  std::copy_n(bounds->distance, kBoxWidth, bounds->surface);
+  return true;
 }
 
 // Cover spheres hold the surface, and nothing inside is farther from them than the interior gap.

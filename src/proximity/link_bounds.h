@@ -20,6 +20,9 @@ struct PlacedLink {
   float R_LO[9] = {};      ///< rotation, row-major
   float p_LO[3] = {};      ///< [m] translation
   float rounding = 0.0F;   ///< [m] largest error of a coordinate or a bound
+  /// The link's root sphere, in the frame O [m]. A radius of infinity: it bounds nothing.
+  float center[3] = {};
+  float radius = std::numeric_limits<float>::infinity();
   /// The link is below the plane normal . p = height. Zero: there is no plane.
   float normal[3] = {};
   float height = std::numeric_limits<float>::infinity();  ///< [m] rounded up
@@ -58,7 +61,9 @@ struct Corners {
 /// Bounds of places about a link. A place is bounded by the link's field of distances (see
 /// DistanceField), or where there is none by the cover spheres of its tree; a box by its centre
 /// less its radius, and by the distances at the corners of the box above it; both by the link's
-/// supporting plane. Bounds have an error of `rounding`, which the caller takes off.
+/// supporting plane. Where little is to be proven, the link's root sphere may be enough for all
+/// boxes of a node: it costs a tenth of the field, whose memory is cold in a first query. Bounds
+/// have an error of `rounding`, which the caller takes off.
 ///
 /// Signed distances of a closed solid fall by no more than the way, so that its bounds hold inside
 /// as well. Near holes what is not known to be outside may be inside, at any depth that the field
@@ -88,6 +93,7 @@ class LinkBounds {
   float bound_points(const PointTile& tile, const Entry& box, float enough, Bounds* bounds) const;
 
  private:
+  bool are_beyond_sphere(const BoxRows& boxes, float enough, Bounds* bounds) const;
   void bound_by_tree(int count, bool are_points, float enough, Bounds* bounds) const;
 
   const PlacedLink& link_;

@@ -97,7 +97,7 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
   search.descent_steps_left = kMaxDescentSteps;
   count_outside_region();
   if (!is_inside_regions()) search.prune(search.region_bound);
-  bool stopped = false;
+  bool stopped = search.goal == Goal::kFree;  // as soon as the link is free
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     for_each_index(clouds, i, [&](const auto& obstacles) { stopped = !run(obstacles) || stopped; });
   }

@@ -59,6 +59,7 @@ SearchOutcome LinkQuery::search(const PosedIndex<Bvh>& obstacles, SearchFront* f
   input.link.rounding = round_up(link_.search.rounding);
   to_row_major(obstacles.X_LO, input.link.R_LO, input.link.p_LO);
   place_plane(link_, obstacles.X_OL, &input.link);
+  if (link_.search.goal == Goal::kFree) place_sphere(context, obstacles.X_OL, &input.link);
   const SearchOutcome found = Search<Measure>(input, *obstacles.bvh, measure).run();
   link_.search.statistics->node_pairs += found.nodes;
   link_.search.statistics->leaf_pairs += found.tiles;

@@ -25,6 +25,9 @@ namespace ist {
 /// [m] More than double loses where distances are compared.
 inline constexpr double kDistanceRounding = 1e-12;
 
+/// [m] A link is free where its bound is above 0: this is, and no more than that has to be proven.
+inline constexpr double kFreeBound = 1e-6;
+
 /// [s] Until each link has a first bound, a run may go on for so long after its deadline: an answer
 /// that is this late is worth more than none.
 inline constexpr double kFirstBounds = 5e-5;
@@ -169,6 +172,7 @@ struct LinkSearch : SearchResult {
   /// [m] A lower bound that is not below this cannot change the answer by more than the tolerance.
   /// @param share  of the tolerance, where more is to be proven than it asks for
   double prune_bound(double share = 1.0) const {
+    if (goal == Goal::kFree) return std::min(kFreeBound, range());
     const double distance = std::min(closest.exact.distance, other_links);
     if (distance > range()) return range();
     // Whether any point is inside is always decided, however wide the tolerance. An obstacle that
@@ -219,6 +223,16 @@ struct LinkQueryState {
   LinkCoherence kept;
   LinkSearch search;
 };
+
+/// Places the link's root sphere in the frame of an index. A mesh with holes may enclose places
+/// beyond it, no farther than the interior gap.
+inline void place_sphere(const LinkContext& link, const Eigen::Isometry3d& X_OL,
+                         PlacedLink* placed) {
+  const InnerSphereTree& tree = link.tree();
+  const Eigen::Vector3d p_OC = X_OL * tree.center();
+  for (int axis = 0; axis < 3; ++axis) placed->center[axis] = static_cast<float>(p_OC[axis]);
+  placed->radius = round_up(tree.radius() + (link.solid().is_closed() ? 0.0 : tree.interior_gap()));
+}
 
 /// Places the link's supporting plane in the frame of an index.
 inline void place_plane(const LinkQueryState& link, const Eigen::Isometry3d& X_OL,
