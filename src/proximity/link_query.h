@@ -108,7 +108,8 @@ class LinkQuery {
   void enter(const Obstacles& obstacles);
   template <class Bvh, class Measure>
   SearchOutcome search(const PosedIndex<Bvh>& obstacles, SearchFront* front, Measure* measure);
-  SearchFront* front_of(std::uint64_t id, const Eigen::Isometry3d& X_OL);
+  SearchFront* front_of(std::uint64_t id, const Eigen::Isometry3d& X_OL,
+                        const CloudSnapshot* spheres_of = nullptr);
   bool has_hardly_moved() const;
   bool begins_with_search() const;
   void measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ);

@@ -254,7 +254,9 @@ bool LinkQuery::search_extents(SnapshotSpan clouds, ExtentSearch* spheres) {
       [&](const auto& obstacles, auto* measure) {
         enter(obstacles);
         const std::uint64_t id = obstacles.bvh->build_id() | kExtentFront;
-        const SearchOutcome found = search(obstacles, front_of(id, obstacles.X_OL), measure);
+        const CloudSnapshot& cloud = *clouds[static_cast<std::size_t>(obstacles.source)];
+        const SearchOutcome found =
+            search(obstacles, front_of(id, obstacles.X_OL, &cloud), measure);
         spheres->refined = std::min(
             spheres->refined, static_cast<double>(found.pruned_bound) - link_.search.rounding);
         return found.has_time;

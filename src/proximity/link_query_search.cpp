@@ -35,9 +35,12 @@ bool LinkQuery::begins_with_search() const {
 }
 
 // The front of an index, at the pose of this search; null: there is no place for one.
-SearchFront* LinkQuery::front_of(std::uint64_t id, const Eigen::Isometry3d& X_OL) {
+// @param spheres_of  the cloud whose spheres are searched; null: obstacles themselves are
+SearchFront* LinkQuery::front_of(std::uint64_t id, const Eigen::Isometry3d& X_OL,
+                                 const CloudSnapshot* spheres_of) {
   SearchFront* front = link_.kept.fronts.find(id);
   if (front != nullptr) {
+    if (spheres_of != nullptr) front->set_extents(spheres_of->extent, spheres_of->box_extent);
     front->begin(id, X_OL, link_.context.displacement, round_up(link_.search.rounding));
   }
   return front;

@@ -1,14 +1,11 @@
 #include "proximity/coherence/scene_tracker.h"
 
 namespace ist {
-namespace {
 
 bool same_extent(const PointExtent& a, const PointExtent& b) {
   return a.constant == b.constant && a.linear == b.linear && a.quadratic == b.quadratic &&
          a.max_range == b.max_range && a.p_FS == b.p_FS;
 }
-
-}  // namespace
 
 SceneTracker::Cloud SceneTracker::identity(const CloudSnapshot& cloud) {
   Cloud id;

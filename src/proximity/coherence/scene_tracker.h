@@ -14,6 +14,9 @@ namespace ist {
 using SceneId = std::uint64_t;
 constexpr SceneId kUnknownScene = 0;
 
+/// Whether both give every point the same radius.
+bool same_extent(const PointExtent& a, const PointExtent& b);
+
 /// Tells whether the clouds of a query are those of the query before, by the build ids of their
 /// indices, the poses of their maps and the regions of interest. One thread.
 class SceneTracker {

@@ -10,6 +10,7 @@
 #include "internal/bvh/box_node.h"
 #include "internal/geometry/float_rounding.h"
 #include "proximity/coherence/front_pose.h"
+#include "proximity/coherence/scene_tracker.h"
 
 namespace ist {
 
@@ -41,6 +42,15 @@ class SearchFront {
 
   SearchFront() : parts_(kMaxParts) {}
 
+  /// Before begin(): the radii of the spheres that the bounds will be of; of a front of obstacles
+  /// themselves it is not called. Bounds of spheres with other radii are discarded.
+  /// @param points  of points
+  /// @param boxes   [m] of every box
+  void set_extents(const PointExtent& points, double boxes) {
+    if (!same_extent(points, points_) || boxes != boxes_) end(false);
+    points_ = points;
+    boxes_ = boxes;
+  }
   /// Begins a search at a new pose.
   /// @param build_id      of the index
   /// @param X_OL          link -> the index's frame
@@ -129,6 +139,8 @@ class SearchFront {
   std::size_t size_ = 0;
   bool is_full_ = false;
   FrontPose pose_;
+  PointExtent points_;
+  double boxes_ = 0.0;  // [m]
 };
 
 using SearchFronts = KeptFronts<SearchFront, 4>;
