@@ -199,6 +199,15 @@ struct VelocityFilter::Impl {
     }
   }
 
+  // Where nothing is told to hold the velocity back, tells the joints whose limits the solver has
+  // neglected beside a joint that is many times as fast.
+  void tell_held() {
+    if (!answer.rows.empty() || !answer.joints.empty()) return;
+    for (Eigen::Index k = 0; k < joints; ++k) {
+      if (x[k] != target[k]) answer.joints.push_back(static_cast<std::size_t>(k));
+    }
+  }
+
   void give(FilterStatus status, FilterReason reason, double factor) {
     answer.status = status;
     answer.reason = reason;
@@ -247,7 +256,8 @@ struct VelocityFilter::Impl {
     if (outcome == NearestVelocity::Outcome::kOutOfTime || !is_met(rows)) {
       return scale(FilterReason::kTime);
     }
-    const bool is_free = answer.rows.empty() && answer.joints.empty();
+    tell_held();
+    const bool is_free = answer.rows.empty() && answer.joints.empty() && x == target;
     give(is_free ? FilterStatus::kFree : FilterStatus::kLimited, FilterReason::kNone, 1.0);
   }
 

@@ -277,6 +277,18 @@ TEST(VelocityFilter, KeepsRowsBesideCommandsAsLargeAsNumbersAre) {
   }
 }
 
+// Beside such a command the solver neglects the limit of a slower joint, which holds all the same.
+// The answer was FREE.
+TEST(VelocityFilter, NamesTheSlowJointBesideAFastOne) {
+  JointLimits limits;
+  limits.speed = {1.0, kInf};
+  VelocityFilter filter(limits);
+  const FilterAnswer& answer = filter.run({1.5, 1e12}, {0.0, 0.0}, empty_rows(0, 2));
+  EXPECT_EQ(answer.velocity, (std::vector<double>{1.0, 1e12}));
+  EXPECT_EQ(answer.status, FilterStatus::kLimited);
+  EXPECT_EQ(answer.joints, std::vector<std::size_t>{0});
+}
+
 // An infinite sum was within its own rounding of every limit, and the difference of two was none
 // of a row's concern: the command was given as it is.
 TEST(VelocityFilter, KeepsRowsWhoseSumsAreTooLargeForNumbers) {
