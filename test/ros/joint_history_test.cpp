@@ -97,6 +97,31 @@ TEST_F(JointHistoryTest, TakesStampsThatAreAheadForPresentOnes) {
   EXPECT_NE(history_.late_joint(ros::Time(10.3), 0.1), "");
 }
 
+// A node that reads tf has positions where their stamps are, also those of a clock that is ahead.
+TEST_F(JointHistoryTest, MovedSinceStampsThatAreAhead) {
+  std::vector<double> q, moved;
+  for (int k = 0; k <= 80; ++k) {
+    const double now = 10.0 + 0.01 * k;
+    add("left", 0.005 * k, now + 0.4, now);
+    const bool is_known = history_.at(ros::Time(now), &q, &moved);
+    EXPECT_EQ(is_known, k >= 40) << "what was sent now came 0.4 s ago";
+  }
+  ASSERT_TRUE(history_.at(ros::Time(10.8), &q, &moved));
+  EXPECT_NEAR(q[left_], 0.4, 1e-6);
+  EXPECT_NEAR(moved[left_], 0.2, 1e-6) << "of a node that reads tf, 0.4 s ago";
+}
+
+// A clock that is ahead by about what is taken for exact: no position waits for the next ones.
+TEST_F(JointHistoryTest, TakesEveryPositionOfAClockThatIsALittleAhead) {
+  add("left", 0.1, 10.0099, 10.0);
+  add("left", 0.2, 10.0121, 10.002);
+  EXPECT_EQ(history_.newest(left_), 0.2);
+  add("left", 0.3, 10.0145, 10.004);
+  EXPECT_EQ(history_.newest(left_), 0.3);
+  add("left", 0.4, 10.0125, 10.0125);
+  EXPECT_EQ(history_.newest(left_), 0.4) << "of a publisher whose clock is right";
+}
+
 TEST_F(JointHistoryTest, TellsOfMimicJointsThatAreNoLongerStated) {
   add("left", 0.1, 10.0, 10.0);
   EXPECT_EQ(history_.late_joint(ros::Time(10.0), 0.1), "");

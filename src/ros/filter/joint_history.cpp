@@ -11,7 +11,7 @@
 namespace ist {
 namespace {
 
-constexpr double kKept = 1.0;  // [s] more than an answer's age may be
+constexpr double kKept = 1.0 + kMaxAhead;  // [s] more than an answer's age may be
 constexpr auto is_before = [](const auto& sample, const ros::Time& t) { return sample.stamp < t; };
 
 }  // namespace
@@ -24,6 +24,7 @@ JointHistory::JointHistory(std::shared_ptr<const Kinematics> kinematics)
 void JointHistory::clear() {
   samples_.clear();
   samples_.resize(kinematics_->joints().size());
+  any_ahead_ = false;
 }
 
 void JointHistory::add(const sensor_msgs::JointState& message, const ros::Time& now) {
@@ -32,15 +33,24 @@ void JointHistory::add(const sensor_msgs::JointState& message, const ros::Time& 
       ahead > kMaxAhead) {
     return;
   }
-  const ros::Time& stamp = ahead > kClockResolution ? now : message.header.stamp;
+  const ros::Time& sent = message.header.stamp;
+  const bool is_ahead = ahead > kClockResolution;
+  any_ahead_ = any_ahead_ || is_ahead;
   ++messages_;
   for (std::size_t i = 0; i < message.name.size(); ++i) {
     const auto joint = kinematics_->find_joint(message.name[i]);
     if (!joint || !std::isfinite(message.position[i])) continue;
-    std::deque<Sample>& samples = samples_[*joint];
-    if (!samples.empty() && stamp < samples.back().stamp) continue;
-    if (!samples.empty() && stamp == samples.back().stamp) samples.pop_back();
-    samples.push_back({stamp, message.position[i], messages_});
+    Samples& samples = samples_[*joint];
+    ros::Time stamp = is_ahead ? now : sent;
+    if (!samples.empty()) {
+      // After a publisher whose clock was ahead, one whose clock is right is new all the same.
+      const Sample& last = samples.back();
+      const bool was_ahead = last.sent > last.stamp;
+      if (sent < last.sent && (!was_ahead || stamp < last.stamp)) continue;
+      stamp = std::max(stamp, last.stamp);
+      if (sent == last.sent) samples.pop_back();
+    }
+    samples.push_back({stamp, sent, message.position[i], messages_});
     while (samples.size() > 1 && seconds_between(samples[1].stamp, stamp) > kKept) {
       samples.pop_front();
     }
@@ -51,7 +61,7 @@ void JointHistory::add(const sensor_msgs::JointState& message, const ros::Time& 
 /// each.
 bool JointHistory::is_of_one_message(const ros::Time& stamp) const {
   std::uint64_t message = 0;
-  for (const std::deque<Sample>& samples : samples_) {
+  for (const Samples& samples : samples_) {
     const auto at = std::lower_bound(samples.begin(), samples.end(), stamp, is_before);
     if (at == samples.end() || at->stamp != stamp) continue;
     if (message != 0 && at->message != message) return false;
@@ -66,7 +76,7 @@ bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q,
   if (moved) moved->assign(samples_.size(), kNaN);
   const bool is_one = moved && is_of_one_message(stamp);
   for (std::size_t j = 0; j < samples_.size(); ++j) {
-    const std::deque<Sample>& samples = samples_[j];
+    const Samples& samples = samples_[j];
     if (samples.empty()) continue;
     const auto after = std::lower_bound(samples.begin(), samples.end(), stamp, is_before);
     const bool is_stated = after != samples.end() && after->stamp == stamp;
@@ -84,6 +94,7 @@ bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q,
     }
     if (!moved) continue;
     (*moved)[j] = std::abs(samples.back().q - (*q)[j]);
+    if (any_ahead_ && !note_ahead(samples, stamp, &(*moved)[j])) return false;
     if (is_stated && is_one) continue;
     const auto oldest = std::lower_bound(samples.begin(), after, stamp,
                                          [](const Sample& sample, const ros::Time& t) {
@@ -97,12 +108,27 @@ bool JointHistory::at(const ros::Time& stamp, std::vector<double>* q,
   return true;
 }
 
+/// Whoever takes stamps of a clock that is ahead as they are has an older position for present.
+/// @param moved  becomes as large as the way since any that may be meant
+/// @returns false where the history does not reach back so far
+bool JointHistory::note_ahead(const Samples& samples, const ros::Time& stamp, double* moved) const {
+  auto sample = samples.rbegin();
+  bool is_ahead = false;
+  for (; sample != samples.rend() && (sample->sent > stamp || sample->stamp > stamp); ++sample) {
+    is_ahead = is_ahead || sample->sent > sample->stamp;
+    *moved = std::max(*moved, std::abs(samples.back().q - sample->q));
+  }
+  if (sample == samples.rend()) return !is_ahead;
+  *moved = std::max(*moved, std::abs(samples.back().q - sample->q));
+  return true;
+}
+
 double JointHistory::newest(std::size_t joint) const {
   return samples_[joint].empty() ? kNaN : samples_[joint].back().q;
 }
 
 double JointHistory::velocity(std::size_t joint, double window) const {
-  const std::deque<Sample>& samples = samples_[joint];
+  const Samples& samples = samples_[joint];
   for (auto sample = samples.rbegin(); sample != samples.rend(); ++sample) {
     const double passed = seconds_between(sample->stamp, samples.back().stamp);
     if (passed >= window) return (samples.back().q - sample->q) / passed;
@@ -123,7 +149,7 @@ double JointHistory::age(const ros::Time& now) const {
 std::string JointHistory::late_joint(const ros::Time& now, double timeout) const {
   const auto& joints = kinematics_->joints();
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    const std::deque<Sample>& samples = samples_[j];
+    const Samples& samples = samples_[j];
     const bool is_stated_mimic = joints[j].source != j && !samples.empty();
     if (!joints[j].is_free() && !is_stated_mimic) continue;
     if (samples.empty()) return "no position of joint '" + joints[j].name + "' has been stated";

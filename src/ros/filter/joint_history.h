@@ -21,7 +21,8 @@ class JointHistory {
   /// Takes the positions of a message that can be used: names and positions of one size, finite, a
   /// stamp that is not 0, not older than the last one of the joint and not ahead of the clock by
   /// more than kMaxAhead; those that are ahead by more than kClockResolution are taken for present
-  /// ones. Others stay as they are.
+  /// ones, as by a node that reads joint states. A node that reads tf has them where they are
+  /// stamped. Others stay as they are.
   void add(const sensor_msgs::JointState& message, const ros::Time& now);
   /// Forgets everything: the clock has gone back.
   void clear();
@@ -29,7 +30,8 @@ class JointHistory {
   /// The positions [rad, m] by joint of the kinematics at an instant, between those that are stated
   /// of a joint by a straight line; the newest one after it. A joint that is not stated is NaN.
   /// @param moved  may be null; [rad, m] by joint: how far its newest position is from that one,
-  ///               and from those before it that a node may have held until then
+  ///               from those before it that a node may have held until then, and from where it
+  ///               was by the stamps of a clock that is ahead
   /// @returns false where the history of a joint does not reach back to the instant
   bool at(const ros::Time& stamp, std::vector<double>* q,
           std::vector<double>* moved = nullptr) const;
@@ -49,17 +51,20 @@ class JointHistory {
   std::string late_joint(const ros::Time& now, double timeout) const;
 
  private:
-  bool is_of_one_message(const ros::Time& stamp) const;
-
   struct Sample {
-    ros::Time stamp;
+    ros::Time stamp, sent;  ///< that counts, and as it came
     double q;               ///< [rad, m]
     std::uint64_t message;  ///< its number
   };
+  using Samples = std::deque<Sample>;
+
+  bool is_of_one_message(const ros::Time& stamp) const;
+  bool note_ahead(const Samples& samples, const ros::Time& stamp, double* moved) const;
 
   std::shared_ptr<const Kinematics> kinematics_;
-  std::vector<std::deque<Sample>> samples_;  ///< by joint, in the order of their stamps
-  std::uint64_t messages_ = 0;               ///< that were taken
+  std::vector<Samples> samples_;  ///< by joint, in the order of their stamps
+  std::uint64_t messages_ = 0;    ///< that were taken
+  bool any_ahead_ = false;        ///< a sample was sent by a clock that is ahead
 };
 
 }  // namespace ist
