@@ -50,6 +50,20 @@ TEST_F(JointHistoryTest, MeasuresVelocityUpToTheNewestPosition) {
   EXPECT_NEAR(history_.velocity(left_, 0.05), 0.3, 1e-6);
 }
 
+// The node does not use a joint that a message states at two places either.
+TEST_F(JointHistoryTest, APlaceThatIsStatedTwiceIsNone) {
+  add("left", 0.1, 10.0, 10.0);
+  sensor_msgs::JointState message;
+  message.header.stamp = ros::Time(10.1);
+  message.name = {"left", "left", "left"};
+  message.position = {0.2, 0.3, 0.3};
+  history_.add(message, ros::Time(10.1));
+  EXPECT_EQ(history_.newest(left_), 0.1);
+  message.position = {0.2, 0.2, 0.2};
+  history_.add(message, ros::Time(10.1));
+  EXPECT_EQ(history_.newest(left_), 0.2);
+}
+
 // Joints that are stated apart, one of them seldom: each has its own times.
 TEST_F(JointHistoryTest, StatesOfOthersAreNoneOfAJoint) {
   const auto place = [](double t) { return 0.3 + 0.2 * t; };  // of "left", at 12.5 Hz

@@ -24,6 +24,7 @@ JointHistory::JointHistory(std::shared_ptr<const Kinematics> kinematics)
 void JointHistory::clear() {
   samples_.clear();
   samples_.resize(kinematics_->joints().size());
+  disputed_.assign(samples_.size(), 0);
   any_ahead_ = false;
 }
 
@@ -41,6 +42,12 @@ void JointHistory::add(const sensor_msgs::JointState& message, const ros::Time& 
     const auto joint = kinematics_->find_joint(message.name[i]);
     if (!joint || !std::isfinite(message.position[i])) continue;
     Samples& samples = samples_[*joint];
+    if (!samples.empty() && samples.back().message == messages_ &&
+        samples.back().q != message.position[i]) {
+      samples.pop_back();
+      disputed_[*joint] = messages_;
+    }
+    if (disputed_[*joint] == messages_) continue;
     ros::Time stamp = is_ahead ? now : sent;
     if (!samples.empty()) {
       // After a publisher whose clock was ahead, one whose clock is right is new all the same.

@@ -18,11 +18,11 @@ class JointHistory {
  public:
   explicit JointHistory(std::shared_ptr<const Kinematics> kinematics);
 
-  /// Takes the positions of a message that can be used: names and positions of one size, finite, a
-  /// stamp that is not 0, not older than the last one of the joint and not ahead of the clock by
-  /// more than kMaxAhead; those that are ahead by more than kClockResolution are taken for present
-  /// ones, as by a node that reads joint states. A node that reads tf has them where they are
-  /// stamped. Others stay as they are.
+  /// Takes the positions of a message that can be used: names and positions of one size, finite,
+  /// one for a joint, a stamp that is not 0, not older than the last one of the joint and not ahead
+  /// of the clock by more than kMaxAhead; those that are ahead by more than kClockResolution are
+  /// taken for present ones, as by a node that reads joint states. A node that reads tf has them
+  /// where they are stamped. Others stay as they are.
   void add(const sensor_msgs::JointState& message, const ros::Time& now);
   /// Forgets everything: the clock has gone back.
   void clear();
@@ -62,9 +62,10 @@ class JointHistory {
   bool note_ahead(const Samples& samples, const ros::Time& stamp, double* moved) const;
 
   std::shared_ptr<const Kinematics> kinematics_;
-  std::vector<Samples> samples_;  ///< by joint, in the order of their stamps
-  std::uint64_t messages_ = 0;    ///< that were taken
-  bool any_ahead_ = false;        ///< a sample was sent by a clock that is ahead
+  std::vector<Samples> samples_;         ///< by joint, in the order of their stamps
+  std::uint64_t messages_ = 0;           ///< that were taken
+  std::vector<std::uint64_t> disputed_;  ///< by joint: the last message that has stated it twice
+  bool any_ahead_ = false;               ///< a sample was sent by a clock that is ahead
 };
 
 }  // namespace ist
