@@ -2,13 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "ist_proximity/geometry/error.h"
+#include "support/environment.h"
 #include "support/errors.h"
 #include "support/temp_dir.h"
 
@@ -20,38 +19,10 @@ std::string manifest(const std::string& name) {
          " </name>\n</package>\n";
 }
 
-// Sets ROS_PACKAGE_PATH and puts it back.
-class PackagePath {
- public:
-  explicit PackagePath(const std::string& value) {
-    const char* old = std::getenv("ROS_PACKAGE_PATH");
-    was_set_ = old != nullptr;
-    if (was_set_) old_ = old;
-    setenv("ROS_PACKAGE_PATH", value.c_str(), 1);
-  }
-  ~PackagePath() {
-    if (was_set_) {
-      setenv("ROS_PACKAGE_PATH", old_.c_str(), 1);
-    } else {
-      unsetenv("ROS_PACKAGE_PATH");
-    }
-  }
-  PackagePath(const PackagePath&) = delete;
-  PackagePath& operator=(const PackagePath&) = delete;
-
- private:
-  bool was_set_ = false;
-  std::string old_;
-};
-
 std::string one_package(const std::string& name) { return name == "robot" ? "/share/robot" : ""; }
 
 std::string error_of(const std::string& uri, const PackageFinder& finder = one_package) {
-  try {
-    return "no error, but " + resolve_uri(uri, finder);
-  } catch (const ModelError& error) {
-    return error.what();
-  }
+  return test::error_of([&] { resolve_uri(uri, finder); });
 }
 
 using test::expect_says;
@@ -108,7 +79,7 @@ TEST(ResolveUri, refusesPathsThatLeadOutOfThePackage) {
 class EnvironmentPackages : public testing::Test {
  protected:
   std::string find(const std::string& path, const std::string& package) {
-    const PackagePath variable(path);
+    const test::Environment variable("ROS_PACKAGE_PATH", path.c_str());
     return environment_package_finder()(package);
   }
   std::string folder(const std::string& name) { return dir_.file(name); }
@@ -164,7 +135,7 @@ TEST_F(EnvironmentPackages, finderCanBeSharedByThreads) {
     const std::string name = "p" + std::to_string(i);
     dir_.write("src/group/" + name + "/package.xml", manifest(name));
   }
-  const PackagePath variable(folder("src"));
+  const test::Environment variable("ROS_PACKAGE_PATH", folder("src").c_str());
   const PackageFinder finder = environment_package_finder();
   std::vector<std::string> found(20);
   std::vector<std::thread> threads;

@@ -4,18 +4,21 @@
 
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "support/environment.h"
+#include "support/errors.h"
 #include "support/meshes.h"
 #include "support/temp_dir.h"
 
@@ -43,12 +46,11 @@ void expect_equal(const Packing& a, const Packing& b) {
     EXPECT_EQ(a.spheres[i].radius, b.spheres[i].radius);
     EXPECT_EQ(a.spheres[i].cover_radius, b.spheres[i].cover_radius);
   }
-  EXPECT_EQ(a.certificate.max_gap, b.certificate.max_gap);
-  EXPECT_EQ(a.certificate.mean_gap, b.certificate.mean_gap);
-  EXPECT_EQ(a.certificate.interior_gap, b.certificate.interior_gap);
-  EXPECT_EQ(a.certificate.unreachable_area, b.certificate.unreachable_area);
-  EXPECT_EQ(a.certificate.surface_area, b.certificate.surface_area);
-  EXPECT_EQ(a.certificate.reached, b.certificate.reached);
+  const auto numbers = [](const PackingCertificate& c) {
+    return std::make_tuple(c.max_gap, c.mean_gap, c.interior_gap, c.unreachable_area,
+                           c.surface_area, c.reached);
+  };
+  EXPECT_EQ(numbers(a.certificate), numbers(b.certificate));
 }
 
 std::string content(const fs::path& path) {
@@ -60,11 +62,16 @@ class PackingCacheTest : public testing::Test {
  protected:
   PackingCacheTest() : cache_(dir_.file("deep/cache")) {}
 
+  // What is stored; warning_ says why there is none.
+  std::optional<Packing> load(const PackingCache& cache) {
+    warning_.clear();
+    return cache.load_unchecked(kKey, kManySpheres, &warning_);
+  }
+
   // Stores the packing and returns its file's name; the folder holds no other file.
   fs::path store(const Packing& packing) {
-    std::string warning;
-    EXPECT_TRUE(cache_.store(kKey, packing, &warning)) << warning;
-    EXPECT_EQ(warning, "");
+    EXPECT_TRUE(cache_.store(kKey, packing, &warning_));
+    EXPECT_EQ(warning_, "");
     std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(dir_.file("deep/cache"))) {
       files.push_back(entry.path());
@@ -76,23 +83,22 @@ class PackingCacheTest : public testing::Test {
   void expect_refused(const fs::path& file, const std::string& bytes, const std::string& why) {
     fs::remove(file);  // file systems flush a file that is truncated: 5 ms each
     std::ofstream(file, std::ios::binary) << bytes;
-    std::string warning;
-    EXPECT_FALSE(cache_.load_unchecked(kKey, kManySpheres, &warning).has_value()) << why;
-    EXPECT_NE(warning.find(file.string()), std::string::npos) << why << ": " << warning;
-    EXPECT_NE(warning.find(why), std::string::npos) << why << ": " << warning;
+    EXPECT_FALSE(load(cache_)) << why;
+    test::expect_says(warning_, file.string());
+    test::expect_says(warning_, why);
   }
 
   test::TempDir dir_;
   PackingCache cache_;
+  std::string warning_;
 };
 
 TEST_F(PackingCacheTest, returnsTheStoredPacking) {
   store(sample_packing());
-  std::string warning;
-  const auto loaded = cache_.load_unchecked(kKey, kManySpheres, &warning);
-  ASSERT_TRUE(loaded.has_value()) << warning;
+  const auto loaded = load(cache_);
+  ASSERT_TRUE(loaded) << warning_;
   expect_equal(*loaded, sample_packing());
-  EXPECT_EQ(warning, "");
+  EXPECT_EQ(warning_, "");
 }
 
 // A writer that is killed leaves its temporary file, which nothing ever read or removed.
@@ -111,8 +117,7 @@ TEST_F(PackingCacheTest, storingRemovesWhatKilledWritersHaveLeft) {
   add("another.istpack", minutes(60 * 24));
   fs::create_directory(folder / "a.istpack.b.tmp");
   fs::last_write_time(folder / "a.istpack.b.tmp", now - minutes(61));
-  std::string warning;
-  EXPECT_TRUE(cache_.store(kKey, sample_packing(), &warning)) << warning;
+  EXPECT_TRUE(cache_.store(kKey, sample_packing(), &warning_)) << warning_;
   std::set<std::string> names;
   for (const auto& entry : fs::directory_iterator(folder)) {
     names.insert(entry.path().filename().string());
@@ -124,17 +129,16 @@ TEST_F(PackingCacheTest, storingRemovesWhatKilledWritersHaveLeft) {
 }
 
 TEST_F(PackingCacheTest, anAbsentFileIsNoWarning) {
-  std::string warning;
-  EXPECT_FALSE(cache_.load_unchecked(kKey, kManySpheres, &warning).has_value());
-  EXPECT_EQ(warning, "");
+  EXPECT_FALSE(load(cache_));
+  EXPECT_EQ(warning_, "");
 }
 
 TEST_F(PackingCacheTest, noDirectoryTurnsItOff) {
   const PackingCache off("");
-  std::string warning;
-  EXPECT_TRUE(off.store(kKey, sample_packing(), &warning));
-  EXPECT_FALSE(off.load_unchecked(kKey, kManySpheres, &warning).has_value());
-  EXPECT_EQ(warning, "");
+  EXPECT_TRUE(off.store(kKey, sample_packing(), &warning_));
+  EXPECT_EQ(warning_, "");
+  EXPECT_FALSE(load(off));
+  EXPECT_EQ(warning_, "");
   EXPECT_FALSE(fs::exists(kKey + ".istpack"));
 }
 
@@ -191,28 +195,25 @@ TEST_F(PackingCacheTest, refusesNumbersThatAreNoPacking) {
   bad[6].certificate.interior_gap = inf;
   bad[7].spheres.clear();
   for (std::size_t i = 0; i < bad.size(); ++i) {
-    std::string warning;
-    ASSERT_TRUE(cache_.store(kKey, bad[i], &warning));
-    EXPECT_FALSE(cache_.load_unchecked(kKey, kManySpheres, &warning).has_value()) << i;
-    EXPECT_NE(warning, "") << i;
+    ASSERT_TRUE(cache_.store(kKey, bad[i], &warning_));
+    EXPECT_FALSE(load(cache_)) << i;
+    EXPECT_NE(warning_, "") << i;
   }
 }
 
 TEST_F(PackingCacheTest, saysWhenTheDiskRefuses) {
   const std::string in_the_way = dir_.write("file", "no folder");
   const PackingCache cache(in_the_way);
-  std::string warning;
-  EXPECT_FALSE(cache.store(kKey, sample_packing(), &warning));
-  EXPECT_NE(warning.find(in_the_way), std::string::npos) << warning;
+  EXPECT_FALSE(cache.store(kKey, sample_packing(), &warning_));
+  test::expect_says(warning_, in_the_way);
   EXPECT_EQ(content(in_the_way), "no folder");
 
   fs::create_directories(dir_.file("deep/cache/" + kKey + ".istpack/occupied"));
-  warning.clear();
-  EXPECT_FALSE(cache_.store(kKey, sample_packing(), &warning));
-  EXPECT_NE(warning, "");
-  warning.clear();
-  EXPECT_FALSE(cache_.load_unchecked(kKey, kManySpheres, &warning).has_value());
-  EXPECT_NE(warning, "");
+  warning_.clear();
+  EXPECT_FALSE(cache_.store(kKey, sample_packing(), &warning_));
+  EXPECT_NE(warning_, "");
+  EXPECT_FALSE(load(cache_));
+  EXPECT_NE(warning_, "");
   // No temporary file remains.
   EXPECT_EQ(std::distance(fs::directory_iterator(dir_.file("deep/cache")), {}), 1);
 }
@@ -273,43 +274,16 @@ TEST(PackingKey, isTheSameForTheSameNumbers) {
   EXPECT_EQ(packing_key(zero, config), packing_key(minus_zero, config));
 }
 
-// Sets or removes an environment variable during its lifetime.
-class Environment {
- public:
-  Environment(const char* name, const char* value) : name_(name) {
-    const char* old = std::getenv(name);
-    was_set_ = old != nullptr;
-    if (was_set_) old_ = old;
-    set(value);
-  }
-  ~Environment() { set(was_set_ ? old_.c_str() : nullptr); }
-  Environment(const Environment&) = delete;
-  Environment& operator=(const Environment&) = delete;
-
- private:
-  void set(const char* value) const {
-    if (value != nullptr) {
-      setenv(name_, value, 1);
-    } else {
-      unsetenv(name_);
-    }
-  }
-
-  const char* name_;
-  bool was_set_;
-  std::string old_;
-};
-
 TEST(DefaultCacheDirectory, IsInRosHome) {
-  const Environment home("HOME", "/home/robot");
+  const test::Environment home("HOME", "/home/robot");
   {
-    const Environment ros_home("ROS_HOME", "/var/ros");
+    const test::Environment ros_home("ROS_HOME", "/var/ros");
     EXPECT_EQ(default_cache_directory(), "/var/ros/ist_proximity");
   }
   for (const char* value : {static_cast<const char*>(nullptr), ""}) {
-    const Environment ros_home("ROS_HOME", value);
+    const test::Environment ros_home("ROS_HOME", value);
     EXPECT_EQ(default_cache_directory(), "/home/robot/.ros/ist_proximity");
-    const Environment homeless("HOME", nullptr);
+    const test::Environment homeless("HOME", nullptr);
     EXPECT_EQ(default_cache_directory(), "");
   }
 }
