@@ -22,15 +22,15 @@
 namespace ist {
 namespace {
 
+using test::at;
+
 constexpr double kPadding = 0.02;
 constexpr double kNoise = 0.005;  // [m]
 constexpr std::size_t kWidth = 320, kHeight = 240;
 constexpr double kFocal = 270.0;  // [pixels]
 
-Eigen::Isometry3d at(double x, double y, double z) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.translation() = Eigen::Vector3d(x, y, z);
-  return X;
+Eigen::AngleAxisd turn(double angle, const Eigen::Vector3d& axis) {
+  return Eigen::AngleAxisd(angle, axis.normalized());
 }
 
 struct Body {
@@ -43,12 +43,8 @@ struct Body {
 
 // An arm of a box, a tube and a ball, a metre in front of the camera, which looks along z.
 std::vector<Body> arm() {
-  Eigen::Isometry3d tube = at(0.0, 0.05, 1.0);
-  tube.linear() = Eigen::AngleAxisd(1.3, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  Eigen::Isometry3d box = at(-0.3, 0.0, 1.1);
-  box.linear() =
-      Eigen::AngleAxisd(0.5, Eigen::Vector3d(1.0, 1.0, 0.0).normalized()).toRotationMatrix();
-  return {Body(Box{{0.25, 0.3, 0.2}}, box), Body(Cylinder{0.06, 0.5}, tube),
+  return {Body(Box{{0.25, 0.3, 0.2}}, at(-0.3, 0.0, 1.1) * turn(0.5, {1.0, 1.0, 0.0})),
+          Body(Cylinder{0.06, 0.5}, at(0.0, 0.05, 1.0) * turn(1.3, {0.0, 1.0, 0.0})),
           Body(test::icosphere(0.1, 4), at(0.3, 0.05, 0.95))};
 }
 
@@ -71,37 +67,31 @@ struct Image {
   RawCloud raw() const { return packed_cloud(xyz.data(), kWidth, kHeight); }
 };
 
-// A picture from X_FS of bodies, with noise along the rays; a wall is 2.5 m away.
-Image picture(const std::vector<const Body*>& bodies, const Eigen::Isometry3d& X_FS, double noise,
-              int seed) {
+// A picture of bodies from the fixed frame's origin, with noise along the rays; a wall is 2.5 m
+// away.
+Image picture(std::vector<Body> bodies, const std::vector<Body>& others, int seed) {
+  bodies.insert(bodies.end(), others.begin(), others.end());
   Image image;
   std::mt19937 random(static_cast<unsigned>(seed));
-  std::normal_distribution<double> normal(0.0, noise);
+  std::normal_distribution<double> normal(0.0, kNoise);
   for (std::size_t i = 0; i < kWidth * kHeight; ++i) {
     const Eigen::Vector3d d((static_cast<double>(i % kWidth) - 0.5 * (kWidth - 1)) / kFocal,
                             (static_cast<double>(i / kWidth) - 0.5 * (kHeight - 1)) / kFocal, 1.0);
     double t = 2.5;
     int seen = -1;
     for (std::size_t b = 0; b < bodies.size(); ++b) {
-      const Eigen::Isometry3d X_LS = bodies[b]->X_FL.inverse() * X_FS;
-      const RayHit hit = ray_cast(bodies[b]->link.solid, X_LS.translation(), X_LS.linear() * d, t);
+      const Eigen::Isometry3d X_LS = bodies[b].X_FL.inverse();
+      const RayHit hit = ray_cast(bodies[b].link.solid, X_LS.translation(), X_LS.linear() * d, t);
       if (!(hit.t < t)) continue;
       t = hit.t;
       seen = static_cast<int>(b);
     }
-    const double range = t * d.norm() + (noise > 0.0 ? normal(random) : 0.0);
+    const double range = t * d.norm() + normal(random);
     const Eigen::Vector3f p = (range * d.normalized()).cast<float>();
     image.xyz.insert(image.xyz.end(), p.data(), p.data() + 3);
     image.seen.push_back(seen);
   }
   return image;
-}
-
-std::vector<const Body*> pointers(const std::vector<Body>& robot, const std::vector<Body>& others) {
-  std::vector<const Body*> all;
-  for (const Body& body : robot) all.push_back(&body);
-  for (const Body& body : others) all.push_back(&body);
-  return all;
 }
 
 IngestConfig config_of(SelfFilterMode mode) {
@@ -116,15 +106,6 @@ IngestConfig config_of(SelfFilterMode mode) {
 struct Share {
   int pixels = 0, kept = 0;
 };
-Share share_of(const Image& image, const std::set<std::uint32_t>& kept, int first, int last) {
-  Share share;
-  for (std::size_t i = 0; i < image.seen.size(); ++i) {
-    if (image.seen[i] < first || image.seen[i] > last) continue;
-    ++share.pixels;
-    share.kept += static_cast<int>(kept.count(static_cast<std::uint32_t>(i)));
-  }
-  return share;
-}
 
 // Whether a pixel shows this body or a later one within four pixels, which is a tile.
 bool has_neighbour(const Image& image, std::size_t pixel, int body) {
@@ -142,51 +123,66 @@ bool has_neighbour(const Image& image, std::size_t pixel, int body) {
   return false;
 }
 
-// Some pictures with the same errors but other noise; the snapshot is that of the last one.
-CloudSnapshot run(Ingest* ingest, const std::vector<Body>& robot, const std::vector<Body>& others,
-                  const Eigen::Isometry3d& X_FS, const Eigen::Isometry3d& X_FS_in_tf, int pictures,
-                  Image* last) {
-  CloudSnapshot snapshot;
-  for (int i = 0; i < pictures; ++i) {
-    *last = picture(pointers(robot, others), X_FS, kNoise, i);
-    ingest->run(last->raw(), X_FS_in_tf, posed(robot), 0.1 * i, &snapshot);
+// An arm before a camera, which is the fixed frame.
+class ViewFilter : public testing::Test {
+ protected:
+  // Some pictures with the same errors but other noise; the snapshot is that of the last one.
+  // @param X_SE  the error of the sensor's pose in tf
+  CloudSnapshot run(Ingest* ingest, const std::vector<Body>& others, int pictures,
+                    const Eigen::Isometry3d& X_SE = Eigen::Isometry3d::Identity()) {
+    CloudSnapshot snapshot;
+    for (int i = 0; i < pictures; ++i) {
+      image = picture(robot, others, i);
+      take_in(image.raw(), 0.1 * i, ingest, &snapshot, X_SE);
+    }
+    return snapshot;
   }
-  return snapshot;
-}
+  void take_in(const RawCloud& cloud, double stamp, Ingest* ingest, CloudSnapshot* snapshot,
+               const Eigen::Isometry3d& X_FS = Eigen::Isometry3d::Identity()) const {
+    ingest->run(cloud, X_FS, posed(robot), stamp, snapshot);
+  }
+  // Of bodies by their numbers.
+  Share share_of(int first, int last, const CloudSnapshot& snapshot) const {
+    const std::set<std::uint32_t> kept = test::ids_of(snapshot.index);
+    Share share;
+    for (std::size_t i = 0; i < image.seen.size(); ++i) {
+      if (image.seen[i] < first || image.seen[i] > last) continue;
+      ++share.pixels;
+      share.kept += static_cast<int>(kept.count(static_cast<std::uint32_t>(i)));
+    }
+    return share;
+  }
+
+  std::vector<Body> robot = arm();
+  Image image;
+  Ingest by_view{config_of(SelfFilterMode::kView)}, by_padding{config_of(SelfFilterMode::kPadding)};
+  CloudSnapshot viewed, padded;
+};
 
 Eigen::Isometry3d camera_error(double position, double angle) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.linear() =
-      Eigen::AngleAxisd(angle, Eigen::Vector3d(1.0, 2.0, -1.0).normalized()).toRotationMatrix();
-  X.translation() = position * Eigen::Vector3d(1.0, -1.0, 1.0).normalized();
-  return X;
+  return at(position * Eigen::Vector3d(1.0, -1.0, 1.0).normalized()) *
+         turn(angle, {1.0, 2.0, -1.0});
 }
 
 // A box in front of the robot, whose back touches it and whose front is 12 mm from it, and one
 // beside it. The padding of 20 mm hides all of the first; the view shows nearly all of both, and of
 // the 10^4 points of the robot none but next to them.
-TEST(ViewFilter, whatTouchesIsNoPartOfTheRobot) {
-  const std::vector<Body> robot = arm();
-  Eigen::Isometry3d front = robot[0].X_FL;
-  front.translation() -= front.linear() * Eigen::Vector3d(0.0, 0.0, 0.1 + 0.006);
+TEST_F(ViewFilter, whatTouchesIsNoPartOfTheRobot) {
+  const Eigen::Isometry3d front = robot[0].X_FL * at(0.0, 0.0, -0.1 - 0.006);
   const std::vector<Body> others = {Body(Box{{0.06, 0.06, 0.012}}, front),
                                     Body(Sphere{0.03}, at(0.0, 0.05 + 0.06 + 0.03, 1.0))};
-  Image image;
-  Ingest by_padding(config_of(SelfFilterMode::kPadding)), by_view(config_of(SelfFilterMode::kView));
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  const CloudSnapshot padded = run(&by_padding, robot, others, X_FS, X_FS, 2, &image);
-  EXPECT_LT(share_of(image, test::ids_of(padded.index), 3, 3).kept,
-            share_of(image, {}, 3, 3).pixels / 10);
+  padded = run(&by_padding, others, 2);
+  EXPECT_LT(share_of(3, 3, padded).kept, share_of(3, 3, padded).pixels / 10);
   EXPECT_FALSE(padded.view.is_used);
 
-  const CloudSnapshot viewed = run(&by_view, robot, others, X_FS, X_FS, 2, &image);
+  viewed = run(&by_view, others, 2);
   ASSERT_TRUE(viewed.view.is_used);
   const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
-  const Share plate = share_of(image, kept, 3, 3), ball = share_of(image, kept, 4, 4);
+  const Share plate = share_of(3, 3, viewed), ball = share_of(4, 4, viewed);
   EXPECT_GT(plate.pixels, 100);
   EXPECT_GT(plate.kept, 0.9 * plate.pixels);
   EXPECT_GT(ball.kept, 0.9 * ball.pixels);
-  EXPECT_GT(share_of(image, kept, 0, 2).pixels, 10000);
+  EXPECT_GT(share_of(0, 2, viewed).pixels, 10000);
   for (std::size_t i = 0; i < image.seen.size(); ++i) {
     const bool is_arm = image.seen[i] >= 0 && image.seen[i] <= 2;
     if (!is_arm || kept.count(static_cast<std::uint32_t>(i)) == 0) continue;
@@ -207,21 +203,16 @@ TEST(ViewFilter, whatTouchesIsNoPartOfTheRobot) {
 // A ramp rises from the robot's face, out of the padding. Its foot, which is no higher than the
 // noise, is continued from what is higher. A plate that hangs 60 mm in front of the face is no
 // ramp: nothing is told nearer than 40 mm, nor is any of the face in its shadow.
-TEST(ViewFilter, continuesAnObstacleTowardItsContact) {
-  const std::vector<Body> robot = arm();
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+TEST_F(ViewFilter, continuesAnObstacleTowardItsContact) {
   const Eigen::Isometry3d face = robot[0].X_FL * at(0.0, 0.0, -0.1);
-  Eigen::Isometry3d X_FR = face * at(0.0, 0.0, -0.02);
-  X_FR.rotate(Eigen::AngleAxisd(-0.9, Eigen::Vector3d::UnitY()));
-  const Body ramp(Box{{0.05, 0.08, 0.004}}, X_FR);
+  const Body ramp(Box{{0.05, 0.08, 0.004}},
+                  face * at(0.0, 0.0, -0.02) * turn(-0.9, {0.0, 1.0, 0.0}));
   const Body plate(Box{{0.05, 0.05, 0.004}}, face * at(0.0, 0.0, -0.06));
-  Image image;
-  Ingest at_ramp(config_of(SelfFilterMode::kView)), at_plate(config_of(SelfFilterMode::kView));
+  Ingest at_plate(config_of(SelfFilterMode::kView));
   Share foot;
-  CloudSnapshot viewed;
   for (int i = 0; i < 10; ++i) {
-    image = picture(pointers(robot, {ramp}), X_FS, kNoise, i);
-    at_ramp.run(image.raw(), X_FS, posed(robot), 0.1 * i, &viewed);
+    image = picture(robot, {ramp}, i);
+    take_in(image.raw(), 0.1 * i, &by_view, &viewed);
     const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
     for (std::size_t k = 0; k < image.seen.size(); ++k) {
       const Eigen::Vector3d p_F(image.xyz[3 * k], image.xyz[3 * k + 1], image.xyz[3 * k + 2]);
@@ -232,8 +223,8 @@ TEST(ViewFilter, continuesAnObstacleTowardItsContact) {
   }
   EXPECT_GT(foot.kept, 0.82 * foot.pixels) << "three rings of pixels: 0.85; one: 0.77";
 
-  viewed = run(&at_plate, robot, {plate}, X_FS, X_FS, 3, &image);
-  EXPECT_GT(share_of(image, test::ids_of(viewed.index), 3, 3).kept, 100);
+  viewed = run(&at_plate, {plate}, 3);
+  EXPECT_GT(share_of(3, 3, viewed).kept, 100);
   for (const PointTile& tile : test::tiles_of(viewed.index)) {
     for (int k = 0; k < tile.count; ++k) {
       const Eigen::Vector3d p_F = viewed.index.X_FO() * tile.point(k);
@@ -247,22 +238,17 @@ TEST(ViewFilter, continuesAnObstacleTowardItsContact) {
 // outline, 0.4 m behind it. Nothing of the front link is a part of it, though every sixth of its
 // pixels is in front of its surface by a standard deviation. Nor is the rest of a link, behind a
 // board 0.2 m in front of it that touches the link's neighbour there.
-TEST(ViewFilter, anObstacleEndsAtAnOutlineInTheImage) {
-  std::vector<Body> robot = {Body(Cylinder{0.05, 0.5}, at(0.0, 0.0, 0.9)),
-                             Body(Box{{0.6, 0.6, 0.1}}, at(0.0, 0.0, 1.4)),
-                             Body(Box{{0.1, 0.1, 0.1}}, at(0.0, 0.25, 1.15))};
-  robot[0].X_FL.rotate(Eigen::AngleAxisd(1.2, Eigen::Vector3d::UnitX()));
+TEST_F(ViewFilter, anObstacleEndsAtAnOutlineInTheImage) {
+  robot = {Body(Cylinder{0.05, 0.5}, at(0.0, 0.0, 0.9) * turn(1.2, {1.0, 0.0, 0.0})),
+           Body(Box{{0.6, 0.6, 0.1}}, at(0.0, 0.0, 1.4)),
+           Body(Box{{0.1, 0.1, 0.1}}, at(0.0, 0.25, 1.15))};
   const Body plate(Box{{0.3, 0.3, 0.012}}, at(0.0, 0.0, 1.344)),
       board(Box{{0.1, 0.04, 0.004}}, at(0.0, 0.2, 1.098));
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  Ingest ingest(config_of(SelfFilterMode::kView));
-  CloudSnapshot viewed;
   Share front, others;
   for (int i = 0; i < 10; ++i) {
-    const Image image = picture(pointers(robot, {plate, board}), X_FS, kNoise, i);
-    ingest.run(image.raw(), X_FS, posed(robot), 0.1 * i, &viewed);
-    const Share link = share_of(image, test::ids_of(viewed.index), 0, 0),
-                plates = share_of(image, test::ids_of(viewed.index), 3, 4);
+    image = picture(robot, {plate, board}, i);
+    take_in(image.raw(), 0.1 * i, &by_view, &viewed);
+    const Share link = share_of(0, 0, viewed), plates = share_of(3, 4, viewed);
     front.pixels += link.pixels;
     front.kept += link.kept;
     others.pixels += plates.pixels;
@@ -276,11 +262,9 @@ TEST(ViewFilter, anObstacleEndsAtAnOutlineInTheImage) {
 // In front of the robot, outside its padding of 20 mm, noise of 5 mm puts single pixels: 23 mm may
 // be noise, 33 mm is not. What has three pixels is an obstacle, also where most of them are farther
 // from the robot, or in a tile of which none is near it.
-TEST(ViewFilter, singlePixelsOfNoiseAreTheRobots) {
-  std::vector<Body> robot = arm();  // the others tell where the camera is
-  robot[0] = Body(Box{{0.2, 0.2, 0.1}}, at(0.0, 0.0, 1.05));
+TEST_F(ViewFilter, singlePixelsOfNoiseAreTheRobots) {
+  robot[0] = Body(Box{{0.2, 0.2, 0.1}}, at(0.0, 0.0, 1.05));  // others tell where the camera is
   robot[1].X_FL.translation().x() -= 0.35;
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   const std::size_t middle = kHeight / 2 * kWidth + kWidth / 2;  // first pixel of a tile
   const std::vector<std::size_t> one = {middle + 1}, two = {middle, middle + kWidth},
                                  three = {middle + 1, middle + 2, middle + kWidth + 1};
@@ -297,17 +281,15 @@ TEST(ViewFilter, singlePixelsOfNoiseAreTheRobots) {
                         Case{0.1, one, {}, 0.0, true}, Case{0.023, two, {middle + 1}, 0.045, true},
                         Case{0.023, two, beside, 0.06, true}}) {
     Ingest ingest(config_of(SelfFilterMode::kView));
-    Image image;
-    run(&ingest, robot, {}, X_FS, X_FS, 5, &image);
-    image = picture(pointers(robot, {}), X_FS, kNoise, 5);
-    const auto put = [&image](std::size_t pixel, double height) {
+    run(&ingest, {}, 5);
+    image = picture(robot, {}, 5);
+    const auto put = [&](std::size_t pixel, double height) {
       Eigen::Map<Eigen::Vector3f> p(&image.xyz[3 * pixel]);
       p = ((1.0 - height) / static_cast<double>(p.z()) * p.cast<double>()).cast<float>();
     };
     for (const std::size_t pixel : c.pixels) put(pixel, c.height);
     for (const std::size_t pixel : c.others) put(pixel, c.height_of_others);
-    CloudSnapshot viewed;
-    ingest.run(image.raw(), X_FS, posed(robot), 0.5, &viewed);
+    take_in(image.raw(), 0.5, &ingest, &viewed);
     const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
     for (const std::size_t pixel : c.pixels) {
       EXPECT_EQ(kept.count(static_cast<std::uint32_t>(pixel)) != 0, c.is_obstacle)
@@ -318,20 +300,16 @@ TEST(ViewFilter, singlePixelsOfNoiseAreTheRobots) {
 }
 
 // What the padding keeps, the view keeps; of what the padding drops, the view drops the robot.
-TEST(ViewFilter, dropsNothingThatThePaddingKeeps) {
-  const std::vector<Body> robot = arm();
+TEST_F(ViewFilter, dropsNothingThatThePaddingKeeps) {
   const std::vector<Body> others = {Body(Box{{0.1, 0.1, 0.1}}, at(0.0, 0.15, 0.95))};
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  const Image image = picture(pointers(robot, others), X_FS, kNoise, 1);
+  image = picture(robot, others, 1);
   // Noise of 0.1 mm as stated is far too little, so that nearly everything is in doubt.
   for (const double stated : {1e-4, kNoise}) {
     IngestConfig config = config_of(SelfFilterMode::kView);
     config.view.noise = {stated, 0.0};
-    Ingest by_view(config);
-    CloudSnapshot viewed, padded;
-    by_view.run(image.raw(), X_FS, posed(robot), 0.0, &viewed);
-    Ingest by_padding(config_of(SelfFilterMode::kPadding));
-    by_padding.run(image.raw(), X_FS * viewed.view.X_SC, posed(robot), 0.0, &padded);
+    Ingest doubting(config), padding(config_of(SelfFilterMode::kPadding));
+    take_in(image.raw(), 0.0, &doubting, &viewed);
+    take_in(image.raw(), 0.0, &padding, &padded, viewed.view.X_SC);
     const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
     int lost = 0;
     for (const std::uint32_t id : test::ids_of(padded.index)) lost += kept.count(id) == 0 ? 1 : 0;
@@ -344,13 +322,9 @@ TEST(ViewFilter, dropsNothingThatThePaddingKeeps) {
 
 // The sensor's pose is off by 5 mm and 1 degree: 17 mm at the arm. The correction finds it to a
 // millimetre, and the robot is recognised as well as with the true pose.
-TEST(ViewFilter, correctsTheSensorsPose) {
-  const std::vector<Body> robot = arm();
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+TEST_F(ViewFilter, correctsTheSensorsPose) {
   const Eigen::Isometry3d X_SE = camera_error(0.005, 0.0175);
-  Image image;
-  Ingest ingest(config_of(SelfFilterMode::kView));
-  const CloudSnapshot viewed = run(&ingest, robot, {}, X_FS, X_FS * X_SE, 10, &image);
+  viewed = run(&by_view, {}, 10, X_SE);
   ASSERT_TRUE(viewed.view.is_used);
   EXPECT_FALSE(viewed.view.has_drifted);
   const Eigen::Isometry3d left = X_SE * viewed.view.X_SC;
@@ -361,62 +335,50 @@ TEST(ViewFilter, correctsTheSensorsPose) {
   }
   EXPECT_GT(viewed.view.offset, 0.005);
   EXPECT_LT(viewed.view.uncertainty, 0.001);
-  EXPECT_EQ(share_of(image, test::ids_of(viewed.index), 0, 2).kept, 0);
+  EXPECT_EQ(share_of(0, 2, viewed).kept, 0);
   EXPECT_GT(viewed.view.angle, 0.5 * 0.0175);
 }
 
 // An arm of three bars.
 std::vector<Body> thin_arm() {
-  Eigen::Isometry3d level = at(0.05, -0.1, 1.0), upright = at(-0.2, 0.05, 1.05),
-                    slanting = at(0.2, 0.1, 0.95);
-  level.linear() = Eigen::AngleAxisd(1.4, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  upright.linear() = Eigen::AngleAxisd(1.7, Eigen::Vector3d::UnitX()).toRotationMatrix();
-  slanting.linear() =
-      Eigen::AngleAxisd(0.9, Eigen::Vector3d(1.0, 1.0, 0.0).normalized()).toRotationMatrix();
-  return {Body(Box{{0.07, 0.07, 0.5}}, level), Body(Box{{0.06, 0.06, 0.4}}, upright),
-          Body(Box{{0.06, 0.06, 0.4}}, slanting)};
+  return {Body(Box{{0.07, 0.07, 0.5}}, at(0.05, -0.1, 1.0) * turn(1.4, {0.0, 1.0, 0.0})),
+          Body(Box{{0.06, 0.06, 0.4}}, at(-0.2, 0.05, 1.05) * turn(1.7, {1.0, 0.0, 0.0})),
+          Body(Box{{0.06, 0.06, 0.4}}, at(0.2, 0.1, 0.95) * turn(0.9, {1.0, 1.0, 0.0}))};
 }
 
 // The sensor's pose is off by twice what is stated, which takes most of a thin robot out of the
 // skin. The first picture finds it all the same.
-TEST(ViewFilter, findsAPoseThatTakesTheRobotOutOfItsSkin) {
-  const std::vector<Body> robot = thin_arm();
+TEST_F(ViewFilter, findsAPoseThatTakesTheRobotOutOfItsSkin) {
+  robot = thin_arm();
   test::Rng rng(77);
   for (int i = 0; i < test::scaled(12); ++i) {
-    Eigen::Isometry3d X_SE = Eigen::Isometry3d::Identity();
-    const Eigen::Vector3d axis = test::random_vector(&rng, 1.0).normalized();
-    X_SE.linear() = Eigen::AngleAxisd(0.035, axis).toRotationMatrix();
-    X_SE.translation() = 0.01 * test::random_vector(&rng, 1.0).normalized();
+    const Eigen::AngleAxisd R_SE = turn(0.035, test::random_vector(&rng, 1.0));
+    const Eigen::Isometry3d X_SE = at(0.01 * test::random_vector(&rng, 1.0).normalized()) * R_SE;
     Ingest ingest(config_of(SelfFilterMode::kView));
-    Image image;
-    const CloudSnapshot viewed =
-        run(&ingest, robot, {}, Eigen::Isometry3d::Identity(), X_SE, 1, &image);
+    viewed = run(&ingest, {}, 1, X_SE);
     EXPECT_FALSE(viewed.view.has_drifted) << i;
     const Eigen::Isometry3d left = X_SE * viewed.view.X_SC;
     for (const Body& body : robot) {
       const Eigen::Vector3d p = body.X_FL.translation();
       EXPECT_LT((left * p - p).norm(), 0.005) << i;
     }
-    EXPECT_LT(share_of(image, test::ids_of(viewed.index), 0, 2).kept, 3) << i;
+    EXPECT_LT(share_of(0, 2, viewed).kept, 3) << i;
   }
 }
 
 // A board that stands near the robot in the first picture, where the pose is looked for far about
 // the robot, is not taken for it: neither with the true pose nor with a wrong one.
-TEST(ViewFilter, takesNoBoardForTheRobotInTheFirstPicture) {
+TEST_F(ViewFilter, takesNoBoardForTheRobotInTheFirstPicture) {
   for (const bool is_thin : {false, true}) {
-    const std::vector<Body> robot = is_thin ? thin_arm() : arm();
+    robot = is_thin ? thin_arm() : arm();
     const double front = is_thin ? 0.93 : 0.82;  // [m] some bars pass through the board
     for (const double angle : {0.0, 0.02}) {
       for (const double distance : {0.03, 0.05, 0.08}) {
         for (const double x : {-0.25, 0.0, 0.25}) {
-          std::vector<Body> board;
-          board.emplace_back(Box{{0.3, 0.4, 0.01}}, at(x, 0.0, front - distance));
+          const Body board(Box{{0.3, 0.4, 0.01}}, at(x, 0.0, front - distance));
           Ingest ingest(config_of(SelfFilterMode::kView));
-          Image image;
-          const CloudSnapshot viewed = run(&ingest, robot, board, Eigen::Isometry3d::Identity(),
-                                           camera_error(0.2 * angle, angle), 1, &image);
-          const Share kept = share_of(image, test::ids_of(viewed.index), 3, 3);
+          viewed = run(&ingest, {board}, 1, camera_error(0.2 * angle, angle));
+          const Share kept = share_of(3, 3, viewed);
           EXPECT_GT(kept.pixels, 1000);
           EXPECT_GT(kept.kept, (is_thin ? 0.95 : 0.99) * kept.pixels)
               << angle << ", " << distance << ", " << x;
@@ -427,16 +389,12 @@ TEST(ViewFilter, takesNoBoardForTheRobotInTheFirstPicture) {
 }
 
 // A correction that the stated errors do not allow is told and not applied: the skin is blind.
-TEST(ViewFilter, tellsADriftedSensor) {
-  const std::vector<Body> robot = arm();
+TEST_F(ViewFilter, tellsADriftedSensor) {
   IngestConfig config = config_of(SelfFilterMode::kView);
   config.view.position_error = 0.001;
   config.view.angle_error = 0.001;
   Ingest ingest(config);
-  Image image;
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  const CloudSnapshot viewed =
-      run(&ingest, robot, {}, X_FS, X_FS * camera_error(0.012, 0.0), 40, &image);
+  viewed = run(&ingest, {}, 40, camera_error(0.012, 0.0));
   EXPECT_TRUE(viewed.view.has_drifted);
   EXPECT_GT(viewed.view.offset, 0.004);
   EXPECT_EQ(viewed.view.X_SC.matrix(), Eigen::Matrix4d::Identity());
@@ -445,16 +403,9 @@ TEST(ViewFilter, tellsADriftedSensor) {
 
 // A rotation about the robot's middle moves none of the points on the robot, but an obstacle a
 // metre away by 70 mm. It is four times the stated error, which no correction is.
-TEST(ViewFilter, tellsASensorThatIsTurnedAboutTheRobot) {
-  const std::vector<Body> robot = arm();
-  Ingest ingest(config_of(SelfFilterMode::kView));
+TEST_F(ViewFilter, tellsASensorThatIsTurnedAboutTheRobot) {
   const Eigen::Vector3d middle(0.0, 0.05, 1.0);
-  Eigen::Isometry3d X_SE = Eigen::Isometry3d::Identity();
-  X_SE.linear() = Eigen::AngleAxisd(0.075, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  X_SE.translation() = middle - X_SE.linear() * middle;
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  Image image;
-  const CloudSnapshot viewed = run(&ingest, robot, {}, X_FS, X_FS * X_SE, 40, &image);
+  viewed = run(&by_view, {}, 40, at(middle) * turn(0.075, {0.0, 1.0, 0.0}) * at(-middle));
   const double applied = Eigen::AngleAxisd(viewed.view.X_SC.linear()).angle();
   EXPECT_LE(applied, 3.0 * 0.0175);
   EXPECT_LT(viewed.view.offset, 0.01);
@@ -464,19 +415,16 @@ TEST(ViewFilter, tellsASensorThatIsTurnedAboutTheRobot) {
 
 // What is remembered of a cloud is where the cloud is: both are placed by the corrected pose, and
 // ranges, by which extents grow, count from the corrected sensor.
-TEST(ViewFilter, memoryAndExtentsAreOfTheCorrectedPose) {
-  const std::vector<Body> robot = arm();
+TEST_F(ViewFilter, memoryAndExtentsAreOfTheCorrectedPose) {
   const std::vector<Body> others = {Body(Box{{0.2, 0.2, 0.2}}, at(-0.1, -0.35, 1.0))};
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   const Eigen::Isometry3d X_SE = camera_error(0.005, 0.0175);
   IngestConfig config = config_of(SelfFilterMode::kView);
   config.extent.noise_constant = 0.001;
   config.extent.noise_quadratic = 0.002;
   Ingest ingest(config);
-  Image image;
-  const CloudSnapshot viewed = run(&ingest, robot, others, X_FS, X_FS * X_SE, 10, &image);
+  viewed = run(&ingest, others, 10, X_SE);
   ASSERT_FALSE(viewed.view.has_drifted);
-  EXPECT_LT((viewed.X_FS.translation() - X_FS.translation()).norm(), 0.004);
+  EXPECT_LT(viewed.X_FS.translation().norm(), 0.004);
   EXPECT_EQ(viewed.extent.p_FS, viewed.X_FS.translation());
   std::vector<Eigen::Vector3d> by_id(kWidth * kHeight);
   std::vector<bool> is_kept(kWidth * kHeight, false);
@@ -495,21 +443,14 @@ TEST(ViewFilter, memoryAndExtentsAreOfTheCorrectedPose) {
     ASSERT_LT((scan.hits[hit++].cast<double>() - by_id[i]).norm(), 1e-5) << "pixel " << i;
   }
   // The next cloud is filtered by padding, and placed as it is told.
-  IngestConfig padding = config;
-  padding.self_filter_mode = SelfFilterMode::kPadding;
-  Ingest other(padding);
-  CloudSnapshot padded = viewed;
-  other.run(image.raw(), X_FS * X_SE, posed(robot), 2.0, &padded);
-  EXPECT_EQ(padded.X_FS.matrix(), (X_FS * X_SE).matrix());
+  padded = viewed;
+  take_in(image.raw(), 2.0, &by_padding, &padded, X_SE);
+  EXPECT_EQ(padded.X_FS.matrix(), X_SE.matrix());
 }
 
 // Pixels between an edge of the robot and the wall behind it, within the skin, are no obstacle.
-TEST(ViewFilter, mixedPixelsAndShadowsAreTheRobots) {
-  const std::vector<Body> robot = arm();
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  Image image = picture(pointers(robot, {}), X_FS, kNoise, 1);
-  Ingest ingest(config_of(SelfFilterMode::kView));
-  CloudSnapshot viewed;
+TEST_F(ViewFilter, mixedPixelsAndShadowsAreTheRobots) {
+  image = picture(robot, {}, 1);
   std::size_t mixed = 0;
   std::mt19937 random(1);
   std::uniform_real_distribution<float> behind(0.0F, 0.015F);
@@ -523,37 +464,30 @@ TEST(ViewFilter, mixedPixelsAndShadowsAreTheRobots) {
     ++mixed;
   }
   EXPECT_GT(mixed, 100U);
-  ingest.run(image.raw(), X_FS, posed(robot), 0.0, &viewed);
-  ingest.run(image.raw(), X_FS, posed(robot), 0.1, &viewed);
-  const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
-  EXPECT_LE(share_of(image, kept, 9, 9).kept, static_cast<int>(mixed / 50));
-  EXPECT_EQ(share_of(image, kept, 0, 2).kept, 0);
+  for (const double stamp : {0.0, 0.1}) take_in(image.raw(), stamp, &by_view, &viewed);
+  EXPECT_LE(share_of(9, 9, viewed).kept, static_cast<int>(mixed / 50));
+  EXPECT_EQ(share_of(0, 2, viewed).kept, 0);
 }
 
 // A thin plate that is 6 mm in front of the arm is too weak a sign by itself in a picture as noisy
 // as this. Where it was outside the skin a cloud ago, it stays an obstacle.
-TEST(ViewFilter, whatCameInStaysAnObstacle) {
-  const std::vector<Body> robot = arm();
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+TEST_F(ViewFilter, whatCameInStaysAnObstacle) {
   const auto plate_at = [&](double height) {
-    Eigen::Isometry3d X = robot[0].X_FL;
-    X.translation() -= X.linear() * Eigen::Vector3d(0.0, 0.0, 0.1 + height);
-    return std::vector<Body>{Body(Box{{0.02, 0.02, 0.002}}, X)};
+    return std::vector<Body>{
+        Body(Box{{0.02, 0.02, 0.002}}, robot[0].X_FL * at(0.0, 0.0, -0.1 - height))};
   };
   int alone = 0, tracked = 0, pixels = 0;
   for (int seed = 0; seed < 12; ++seed) {
     for (const bool comes : {false, true}) {
       Ingest ingest(config_of(SelfFilterMode::kView));
-      CloudSnapshot viewed;
       double stamp = 0.0;
       for (const double height : {0.06, 0.03, 0.005}) {
         const bool is_last = height == 0.005;
         const std::vector<Body> plate = plate_at(height);
-        const Image image = picture(pointers(robot, comes || is_last ? plate : std::vector<Body>()),
-                                    X_FS, kNoise, seed);
-        ingest.run(image.raw(), X_FS, posed(robot), stamp += 0.033, &viewed);
+        image = picture(robot, comes || is_last ? plate : std::vector<Body>(), seed);
+        take_in(image.raw(), stamp += 0.033, &ingest, &viewed);
         if (!is_last) continue;
-        const Share share = share_of(image, test::ids_of(viewed.index), 3, 3);
+        const Share share = share_of(3, 3, viewed);
         (comes ? tracked : alone) += share.kept;
         pixels += share.pixels;
       }
@@ -564,18 +498,14 @@ TEST(ViewFilter, whatCameInStaysAnObstacle) {
 }
 
 // Points in any order, and points that are not along rays from the frame's origin, have no view.
-TEST(ViewFilter, otherCloudsAreFilteredByPadding) {
-  const std::vector<Body> robot = arm();
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  Image image = picture(pointers(robot, {}), X_FS, kNoise, 1);
+TEST_F(ViewFilter, otherCloudsAreFilteredByPadding) {
+  image = picture(robot, {}, 1);
   RawCloud list = image.raw();
   list.width *= list.height;
   list.height = 1;
   list.row_step = list.width * list.point_step;
-  Ingest by_view(config_of(SelfFilterMode::kView)), by_padding(config_of(SelfFilterMode::kPadding));
-  CloudSnapshot viewed, padded;
-  by_view.run(list, X_FS, posed(robot), 0.0, &viewed);
-  by_padding.run(list, X_FS, posed(robot), 0.0, &padded);
+  take_in(list, 0.0, &by_view, &viewed);
+  take_in(list, 0.0, &by_padding, &padded);
   EXPECT_FALSE(viewed.view.is_used);
   EXPECT_EQ(test::ids_of(viewed.index), test::ids_of(padded.index));
 
@@ -586,49 +516,45 @@ TEST(ViewFilter, otherCloudsAreFilteredByPadding) {
     for (std::size_t k = 0; k < 3; ++k) std::swap(shuffled[3 * i + k], shuffled[3 * j + k]);
   }
   image.xyz = shuffled;
-  by_view.run(image.raw(), X_FS, posed(robot), 0.1, &viewed);
+  take_in(image.raw(), 0.1, &by_view, &viewed);
   EXPECT_FALSE(viewed.view.is_used);
 }
 
-TEST(ViewFilter, holesAndMissingLinksAreNoTrouble) {
-  const std::vector<Body> robot = arm();
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  Image image = picture(pointers(robot, {}), X_FS, kNoise, 1);
+TEST_F(ViewFilter, holesAndMissingLinksAreNoTrouble) {
+  image = picture(robot, {}, 1);
   std::mt19937 random(2);
   for (std::size_t i = 0; i < image.seen.size(); ++i) {
     if (random() % 3 == 0) image.xyz[3 * i + random() % 3] = std::nanf("");
     if (random() % 50 == 0) image.xyz[3 * i] = std::numeric_limits<float>::infinity();
     if (random() % 100 == 0) std::fill_n(image.xyz.begin() + static_cast<long>(3 * i), 3, 0.0F);
   }
-  Ingest ingest(config_of(SelfFilterMode::kView));
-  CloudSnapshot viewed;
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   const std::vector<PosedSolid> all = posed(robot);
   for (std::size_t links = 3; links > 0; --links) {
-    ingest.run(image.raw(), X_FS, Span<const PosedSolid>(all.data(), links), 0.1, &viewed);
+    by_view.run(image.raw(), X_FS, Span<const PosedSolid>(all.data(), links), 0.1, &viewed);
     EXPECT_EQ(viewed.counts.received, viewed.counts.used + viewed.counts.on_robot +
                                           viewed.counts.out_of_range + viewed.counts.infinite +
                                           viewed.counts.not_a_number);
     EXPECT_GT(viewed.counts.on_robot, 0U);
   }
-  ingest.run(image.raw(), X_FS, {}, 0.2, &viewed);
+  by_view.run(image.raw(), X_FS, {}, 0.2, &viewed);
   EXPECT_EQ(viewed.counts.on_robot, 0U);
 }
 
-TEST(ViewFilter, aSteadyStreamAllocatesNothing) {
-  const std::vector<Body> robot = arm();
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+TEST_F(ViewFilter, aSteadyStreamAllocatesNothing) {
   const std::vector<PosedSolid> solids = posed(robot);
-  const Image image = picture(pointers(robot, {}), X_FS, kNoise, 1);
-  Ingest ingest(config_of(SelfFilterMode::kView));
-  CloudSnapshot snapshot;
-  for (int i = 0; i < 3; ++i) ingest.run(image.raw(), X_FS, solids, 0.1 * i, &snapshot);
+  image = picture(robot, {}, 1);
+  const auto take_in = [&](int i) {
+    by_view.run(image.raw(), Eigen::Isometry3d::Identity(), solids, 0.1 * i, &viewed);
+  };
+  for (int i = 0; i < 3; ++i) take_in(i);
   const long before = test::allocations;
-  for (int i = 3; i < 6; ++i) ingest.run(image.raw(), X_FS, solids, 0.1 * i, &snapshot);
+  for (int i = 3; i < 6; ++i) take_in(i);
   EXPECT_EQ(test::allocations - before, 0);
-  EXPECT_TRUE(snapshot.view.is_used);
+  EXPECT_TRUE(viewed.view.is_used);
 }
 
-TEST(ViewFilter, errorsOutOfRangeAreRefused) {
+TEST_F(ViewFilter, errorsOutOfRangeAreRefused) {
   IngestConfig config = config_of(SelfFilterMode::kView);
   config.view.position_error = 0.0;
   EXPECT_THROW(Ingest{config}, std::invalid_argument);

@@ -20,6 +20,12 @@ Eigen::Vector3d random_vector(Rng* rng, double size);
 
 Eigen::Isometry3d random_pose(Rng* rng, double size);
 
+/// The pose of a place, without a turn.
+inline Eigen::Isometry3d at(const Eigen::Vector3d& p) {
+  return Eigen::Isometry3d(Eigen::Translation3d(p));
+}
+inline Eigen::Isometry3d at(double x, double y, double z) { return at({x, y, z}); }
+
 /// A link of one element.
 LinkModel make_link(const Shape& shape, double max_error);
 
