@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "support/box_oracle.h"
 #include "support/scene.h"
 
 namespace ist {
@@ -195,19 +196,14 @@ TEST(RepulsionFilter, holdsTheNearestPointWhereNothingWasBlended) {
 
 TEST(RepulsionFilter, recognizesNewClouds) {
   const CloudSnapshot a = test::make_snapshot({{0, 0, 0}}), b = test::make_snapshot({{0, 0, 0}});
-  CloudSnapshot map;
-  auto boxes = std::make_shared<BoxIndex>();
-  boxes->build({Eigen::AlignedBox3d(Vector3d(0, 0, 0), Vector3d(1, 1, 1))});
-  map.boxes = boxes;
+  const Eigen::AlignedBox3d box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  const CloudSnapshot map = test::make_map({box});
   const std::uint64_t key = obstacles_key({&a, &map});
   EXPECT_EQ(key, obstacles_key({&a, &map}));
   CloudSnapshot moved = map;  // the map's frame moves as the robot drives, but it is the same map
   moved.X_FM.translation().x() = 1.0;
   EXPECT_EQ(key, obstacles_key({&a, &moved}));
-  CloudSnapshot next = map;  // of the same boxes, but built anew: the map may have changed
-  auto rebuilt = std::make_shared<BoxIndex>();
-  rebuilt->build({Eigen::AlignedBox3d(Vector3d(0, 0, 0), Vector3d(1, 1, 1))});
-  next.boxes = rebuilt;
+  const CloudSnapshot next = test::make_map({box});  // built anew: the map may have changed
   EXPECT_NE(key, obstacles_key({&a, &next}));
   for (const auto& other : {obstacles_key({&b, &map}), obstacles_key({&a}),
                             obstacles_key({&map, &a}), obstacles_key({})}) {

@@ -8,14 +8,18 @@
 #include <random>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "support/box_oracle.h"
+#include "support/scene.h"
 #include "support/tiles.h"
 
 namespace ist {
 namespace {
 
 using Eigen::Vector3d;
+using test::at;
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
+const Eigen::Isometry3d kHere = Eigen::Isometry3d::Identity();
 
 InnerSphere sphere(double x, double y, double z, double radius) {
   return {{x, y, z}, radius, radius};
@@ -36,16 +40,7 @@ std::vector<InnerSphere> bar() {
 }
 
 CloudSnapshot cloud_of(const std::vector<Vector3d>& points, const Vector3d& origin = {0, 0, 0}) {
-  std::vector<float> x, y, z;
-  std::vector<std::uint32_t> id;
-  for (const Vector3d& p : points) {
-    x.push_back(static_cast<float>(p.x() - origin.x()));
-    y.push_back(static_cast<float>(p.y() - origin.y()));
-    z.push_back(static_cast<float>(p.z() - origin.z()));
-    id.push_back(static_cast<std::uint32_t>(id.size()));
-  }
-  CloudSnapshot cloud;
-  cloud.index.build(origin, x.data(), y.data(), z.data(), id.data(), x.size());
+  CloudSnapshot cloud = test::make_snapshot(points, origin);
   cloud.index.bvh().set_thinning(cloud.thinning);
   return cloud;
 }
@@ -61,25 +56,26 @@ std::vector<Vector3d> wall(const Vector3d& centre, const Vector3d& u, const Vect
   return points;
 }
 
-Eigen::Isometry3d at(const Vector3d& p) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.translation() = p;
-  return X;
+std::vector<Vector3d> both(std::vector<Vector3d> a, const std::vector<Vector3d>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
 }
 
-struct Weighted {
+// A place on an obstacle that pushes a sphere. [m] fixed frame
+struct Push {
+  InnerSphere sphere;
   Vector3d p;
   double weight;
 };
 
 // The thinned points of a cloud, each weighted by how much of its cell a surface through it covers.
-std::vector<Weighted> weighted_points(const CloudSnapshot& cloud) {
-  std::vector<Weighted> all;
+std::vector<Push> pushes_of(const CloudSnapshot& cloud, const std::vector<InnerSphere>& spheres) {
+  std::vector<Push> all;
   for (const auto& [id, p] : test::thinned_points_of(cloud.index)) {
     const Vector3d cells = p / cloud.thinning;
     const Vector3d off = cells - cells.array().floor().matrix() - Vector3d::Constant(0.5);
     const double section = 1.0 - off.squaredNorm() / 0.75;
-    all.push_back({p, 0.01 + 0.99 * section * section});
+    for (const InnerSphere& b : spheres) all.push_back({b, p, 0.01 + 0.99 * section * section});
   }
   return all;
 }
@@ -92,31 +88,26 @@ struct Expected {
   Vector3d torque = Vector3d::Zero();  // each pair's force acts at its own witness on the sphere
 };
 
-Expected expected(const std::vector<InnerSphere>& spheres, const Eigen::Isometry3d& X_FL,
-                  const CloudSnapshot& cloud, double smoothing) {
-  const std::vector<Weighted> points = weighted_points(cloud);
+Expected expected(const std::vector<Push>& pushes, const Eigen::Isometry3d& X_FL,
+                  double smoothing) {
   Expected result;
-  for (const InnerSphere& b : spheres) {
-    for (const Weighted& point : points) {
-      const Vector3d to_sphere = X_FL * b.center - point.p;
-      if (to_sphere.norm() - b.radius < result.nearest) {
-        result.nearest = to_sphere.norm() - b.radius;
-        result.nearest_direction = to_sphere.normalized();
-      }
+  for (const auto& [b, p, weight] : pushes) {
+    const Vector3d to_sphere = X_FL * b.center - p;
+    if (to_sphere.norm() - b.radius < result.nearest) {
+      result.nearest = to_sphere.norm() - b.radius;
+      result.nearest_direction = to_sphere.normalized();
     }
   }
   double weights = 0.0;
-  for (const InnerSphere& b : spheres) {
-    for (const Weighted& point : points) {
-      const Vector3d n = (X_FL * b.center - point.p).normalized();
-      const Vector3d witness = X_FL * b.center - b.radius * n;
-      const double root = 1.0 - (n.dot(witness - point.p) - result.nearest) / smoothing;
-      if (root <= 0.0) continue;
-      const double w = root * root * point.weight;
-      result.blend += w * n;
-      result.torque += w * (witness - X_FL.translation()).cross(n);
-      weights += w;
-    }
+  for (const auto& [b, p, weight] : pushes) {
+    const Vector3d n = (X_FL * b.center - p).normalized();
+    const Vector3d witness = X_FL * b.center - b.radius * n;
+    const double root = 1.0 - (n.dot(witness - p) - result.nearest) / smoothing;
+    if (root <= 0.0) continue;
+    const double w = root * root * weight;
+    result.blend += w * n;
+    result.torque += w * (witness - X_FL.translation()).cross(n);
+    weights += w;
   }
   result.blend /= weights;
   result.torque /= weights;
@@ -139,10 +130,10 @@ TEST(Repulsion, unknownIsNanAndClearIsZero) {
   const Repulsion repulsion(robot_of(bar()));
   const CloudSnapshot cloud = cloud_of({{0, 0, 0.2}});
   LinkProximity proximity;
-  EXPECT_TRUE(repulsion(0, at({0, 0, 0}), {&cloud}, proximity, {}).array().isNaN().all());
+  EXPECT_TRUE(repulsion(0, kHere, {&cloud}, proximity, {}).array().isNaN().all());
   proximity.state = LinkState::kClear;
   proximity.distance = kInf;
-  EXPECT_EQ(repulsion(0, at({0, 0, 0}), {&cloud}, proximity, {}), Vector3d::Zero());
+  EXPECT_EQ(repulsion(0, kHere, {&cloud}, proximity, {}), Vector3d::Zero());
 }
 
 TEST(Repulsion, lengthFallsFromGainAtTouchToZeroAtTheInfluenceDistance) {
@@ -152,13 +143,13 @@ TEST(Repulsion, lengthFallsFromGainAtTouchToZeroAtTheInfluenceDistance) {
   config.gain = 3.0;
   for (const double distance : {0.0, 0.05, 0.1, 0.15, 0.1999}) {
     const CloudSnapshot cloud = cloud_of({{0, 0, -0.1 - distance}});
-    const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(distance), config);
+    const Vector3d v = repulsion(0, kHere, {&cloud}, near_by(distance), config);
     EXPECT_NEAR(v.norm(), 3.0 * (1.0 - distance / 0.2), 1e-5);
     EXPECT_NEAR(v.z(), v.norm(), 1e-6) << "away from the point";
   }
   for (const double distance : {0.2, 0.21, 0.9}) {
     const CloudSnapshot cloud = cloud_of({{0, 0, -0.1 - distance}});
-    EXPECT_EQ(repulsion(0, at({0, 0, 0}), {&cloud}, near_by(distance), config), Vector3d::Zero());
+    EXPECT_EQ(repulsion(0, kHere, {&cloud}, near_by(distance), config), Vector3d::Zero());
   }
 }
 
@@ -188,7 +179,7 @@ TEST(Repulsion, agreesWithTheFormula) {
     const CloudSnapshot cloud = cloud_of(points, {1.0, 0.0, -2.0});
     Eigen::Isometry3d X_FL = at({u(random), u(random), u(random)});
     X_FL.rotate(Eigen::AngleAxisd(5.0 * u(random), Vector3d(1, 2, 3).normalized()));
-    const Expected e = expected(spheres, X_FL, cloud, config.smoothing);
+    const Expected e = expected(pushes_of(cloud, spheres), X_FL, config.smoothing);
     const RepulsiveWrench wrench = repulsion.wrench(0, X_FL, {&cloud}, near_by(e.nearest), config);
     const double length = config.gain * std::min(1.0, 1.0 - e.nearest);
     ASSERT_LT((wrench.force - length * e.blend).norm(), 2e-4) << trial;
@@ -200,14 +191,10 @@ TEST(Repulsion, agreesWithTheFormula) {
 // would jump by 94 degrees and the vector by 0.79 in one step of 0.12 mm where two walls are
 // equally near. The blended vector changes by 0.005 at most.
 TEST(Repulsion, isContinuousPastTwoEquallyNearObstacles) {
-  std::vector<Vector3d> points = wall({0, 0, -0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.02);
-  for (const Vector3d& p : wall({0, 0, 0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.02)) {
-    points.push_back(p);
-  }
-  for (const Vector3d& p : wall({0.25, 0, 0}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.02)) {
-    points.push_back(p);
-  }
-  const CloudSnapshot cloud = cloud_of(points);
+  const CloudSnapshot cloud =
+      cloud_of(both(both(wall({0, 0, -0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.02),
+                         wall({0, 0, 0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.02)),
+                    wall({0.25, 0, 0}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.02)));
   const std::vector<InnerSphere> spheres = bar();
   const Repulsion repulsion(robot_of(spheres));
   const RepulsionConfig config;
@@ -217,7 +204,7 @@ TEST(Repulsion, isContinuousPastTwoEquallyNearObstacles) {
   for (int i = 0; i <= kSteps; ++i) {
     const double s = static_cast<double>(i) / kSteps;  // 0.15 m up and 0.1 m forward: 0.12 mm each
     const Eigen::Isometry3d X_FL = at({0.1 * s, 0.0033, -0.075 + 0.15 * s});
-    const Expected e = expected(spheres, X_FL, cloud, config.smoothing);
+    const Expected e = expected(pushes_of(cloud, spheres), X_FL, config.smoothing);
     const Vector3d v = repulsion(0, X_FL, {&cloud}, near_by(e.nearest), config);
     if (i > 0) {
       largest_step = std::max(largest_step, (v - last).norm());
@@ -287,7 +274,7 @@ TEST(Repulsion, contactIsBoundedAndContinuous) {
   Vector3d last(0, 0, 2.0 * (1.0 - 0.02 / 0.3));
   for (double z = -0.12; z < -0.001; z += 0.001) {  // from 20 mm before to 99 mm inside
     const CloudSnapshot cloud = cloud_of({{0, 0, z}});
-    const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(-z - 0.1), config);
+    const Vector3d v = repulsion(0, kHere, {&cloud}, near_by(-z - 0.1), config);
     EXPECT_LE(v.norm(), 2.0 * (1.0 + 1e-6));
     EXPECT_LT((v - last).norm(), 0.01);
     EXPECT_GT(v.z(), 0.0) << "the force points out of the obstacle, away from the point";
@@ -300,19 +287,18 @@ TEST(Repulsion, isDefinedAtTouchAndAtASpheresCentre) {
   const Repulsion repulsion(robot_of({sphere(0.5, 0.25, 0, 0.125)}));
   const Vector3d direction = Vector3d(1, 2, -2) / 3.0;
   const CloudSnapshot touch = cloud_of({{0.625, 0.25, 0}});
-  EXPECT_LT((repulsion(0, at({0, 0, 0}), {&touch}, near_by(0.0), {}) - Vector3d(-1, 0, 0)).norm(),
-            1e-6);
+  EXPECT_LT((repulsion(0, kHere, {&touch}, near_by(0.0), {}) - Vector3d(-1, 0, 0)).norm(), 1e-6);
   const CloudSnapshot centre = cloud_of({{0.5, 0.25, 0}});
-  const Vector3d v = repulsion(0, at({0, 0, 0}), {&centre}, near_by(-0.125, direction), {});
+  const Vector3d v = repulsion(0, kHere, {&centre}, near_by(-0.125, direction), {});
   EXPECT_LT((v - direction).norm(), 1e-6);
   const CloudSnapshot both = cloud_of({{0.5, 0.25, 0}, {0.5, 0.25, 0.01}});
-  EXPECT_TRUE(repulsion(0, at({0, 0, 0}), {&both}, near_by(-0.125, direction), {}).allFinite());
+  EXPECT_TRUE(repulsion(0, kHere, {&both}, near_by(-0.125, direction), {}).allFinite());
 }
 
 TEST(Repulsion, spheresOfRadiusZeroCount) {
   const Repulsion repulsion(robot_of({sphere(0, 0, 0, 0)}));
   const CloudSnapshot cloud = cloud_of({{0.1, 0, 0}});
-  const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.1), {});
+  const Vector3d v = repulsion(0, kHere, {&cloud}, near_by(0.1), {});
   EXPECT_LT((v - Vector3d(-1.0 + 0.1 / 0.3, 0, 0)).norm(), 1e-6);
 }
 
@@ -324,9 +310,7 @@ TEST(Repulsion, severalCloudsAreOneObstacle) {
       wall({0.004, 0.004, 0.004}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);
   const std::vector<Vector3d> b =
       wall({-0.206, 0.004, 0.204}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.01);
-  std::vector<Vector3d> all = a;
-  all.insert(all.end(), b.begin(), b.end());
-  const CloudSnapshot cloud = cloud_of(all), cloud_a = cloud_of(a, {2, 0, 1}),
+  const CloudSnapshot cloud = cloud_of(both(a, b)), cloud_a = cloud_of(a, {2, 0, 1}),
                       cloud_b = cloud_of(b, {0, -1, 0}), empty = cloud_of({});
   const Eigen::Isometry3d X_FL = at({-0.03, 0, 0.1});
   const Vector3d together = repulsion(0, X_FL, {&cloud}, near_by(0.07), {});
@@ -351,31 +335,18 @@ TEST(Repulsion, boxesAgreeWithTheFormula) {
     }
     const Eigen::Isometry3d X_FM(Eigen::Translation3d(0.1 * vector()) *
                                  Eigen::AngleAxisd(0.5 * unit(rng), vector().normalized()));
-    CloudSnapshot map;
-    auto index = std::make_shared<BoxIndex>();
-    index->build(boxes);
-    map.boxes = index;
-    map.X_FM = X_FM;
-    Expected truth;
-    double weights = 0.0;
-    for (const bool second : {false, true}) {
-      for (const InnerSphere& b : spheres) {
-        for (const Eigen::AlignedBox3d& box : boxes) {
-          const Vector3d center_M = X_FM.inverse() * b.center;
-          const Vector3d to_sphere =
-              X_FM.linear() * (center_M - center_M.cwiseMax(box.min()).cwiseMin(box.max()));
-          const double d = to_sphere.norm() - b.radius;
-          if (!second) truth.nearest = std::min(truth.nearest, d);
-          const double root = 1.0 - (d - truth.nearest) / config.smoothing;
-          if (!second || root <= 0.0) continue;
-          truth.blend += root * root * to_sphere.normalized();
-          weights += root * root;
-        }
+    const CloudSnapshot map = test::make_map(boxes, X_FM);
+    std::vector<Push> pushes;
+    for (const InnerSphere& b : spheres) {
+      for (const Eigen::AlignedBox3d& box : boxes) {
+        const Vector3d center_M = X_FM.inverse() * b.center;
+        pushes.push_back({b, X_FM * center_M.cwiseMax(box.min()).cwiseMin(box.max()), 1.0});
       }
     }
-    const Vector3d found = repulsion(0, at({0, 0, 0}), {&map}, near_by(0.1), config);
+    const Expected truth = expected(pushes, kHere, config.smoothing);
+    const Vector3d found = repulsion(0, kHere, {&map}, near_by(0.1), config);
     const double strength = config.gain * (1.0 - 0.1 / config.influence_distance);
-    EXPECT_LT((found - strength * truth.blend / weights).norm(), 1e-4);
+    EXPECT_LT((found - strength * truth.blend).norm(), 1e-4);
   }
 }
 
@@ -387,10 +358,7 @@ TEST(Repulsion, isContinuousAlongBoxes) {
     const Vector3d low(0.1 * i, -0.5 * size, i % 4 == 0 ? 0.1 : 0.14);
     boxes.emplace_back(low, low + Vector3d::Constant(size));
   }
-  auto index = std::make_shared<BoxIndex>();
-  index->build(boxes);
-  CloudSnapshot map;
-  map.boxes = index;
+  const CloudSnapshot map = test::make_map(boxes);
   const Repulsion repulsion(robot_of(bar()));
   Vector3d last = Vector3d::Zero();
   double widest = 0.0;
@@ -420,7 +388,7 @@ TEST(Repulsion, losesNothingFarFromTheFixedFramesOrigin) {
 TEST(Repulsion, withoutPairsItHasTheDirectionOfTheQuery) {
   const Repulsion repulsion(robot_of({}));
   const CloudSnapshot cloud = cloud_of({{0, 0, 0}}), empty = cloud_of({});
-  const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.15, Vector3d::UnitY()), {});
+  const Vector3d v = repulsion(0, kHere, {&cloud}, near_by(0.15, Vector3d::UnitY()), {});
   EXPECT_LT((v - 0.5 * Vector3d::UnitY()).norm(), 1e-12);
 }
 
@@ -444,10 +412,7 @@ TEST(Repulsion, turnedMapsTurnForceAndTorque) {
         X_FL * spheres[static_cast<std::size_t>(trial) % spheres.size()].center +
         (holds_center ? 0.0 : 0.3) * Vector3d(u(random), u(random), u(random));
     const Vector3d half = Vector3d::Constant(0.02);
-    auto index = std::make_shared<BoxIndex>();
-    index->build({Eigen::AlignedBox3d(middle - half, middle + half)});
-    CloudSnapshot map;
-    map.boxes = index;
+    CloudSnapshot map = test::make_map({Eigen::AlignedBox3d(middle - half, middle + half)});
     const Vector3d direction = Vector3d(u(random), u(random), u(random)).normalized();
     const RepulsiveWrench plain =
         repulsion.wrench(0, X_FL, {&map}, near_by(0.05, direction), config);
