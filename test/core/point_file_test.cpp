@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -36,17 +37,19 @@ std::string pcd_header(const std::string& encoding) {
          encoding + "\n";
 }
 
+// The points as lines, between what stands before and after each of them.
+std::string lines(const std::string& before, const std::string& after) {
+  std::ostringstream text;
+  text.precision(9);
+  for (const Eigen::Vector3f& p : kPoints) {
+    text << before << p.x() << " " << p.y() << " " << p.z() << after << "\n";
+  }
+  return text.str();
+}
+
 std::string pcd(const std::string& encoding) {
   std::string bytes = pcd_header(encoding);
-  if (encoding == "ascii") {
-    for (const Eigen::Vector3f& p : kPoints) {
-      char line[200];
-      std::snprintf(line, sizeof(line), "7 %.9g %.9g %.9g 1 2 3\n", static_cast<double>(p.x()),
-                    static_cast<double>(p.y()), static_cast<double>(p.z()));
-      bytes += line;
-    }
-    return bytes;
-  }
+  if (encoding == "ascii") return bytes + lines("7 ", " 1 2 3");
   if (encoding == "binary") {
     for (const Eigen::Vector3f& p : kPoints) {
       append(std::uint16_t{7}, false, &bytes);
@@ -84,16 +87,7 @@ std::string ply(const std::string& encoding) {
                       "property list uchar short sizes\nelement vertex 4\nproperty uchar red\n"
                       "property float x\nproperty double y\nproperty float z\n"
                       "element face 0\nproperty list uchar int vertex_indices\nend_header\n";
-  if (encoding == "ascii") {
-    bytes += "3\n2 640 480\n";
-    for (const Eigen::Vector3f& p : kPoints) {
-      char line[200];
-      std::snprintf(line, sizeof(line), "255 %.9g %.9g %.9g\n", static_cast<double>(p.x()),
-                    static_cast<double>(p.y()), static_cast<double>(p.z()));
-      bytes += line;
-    }
-    return bytes;
-  }
+  if (encoding == "ascii") return bytes + "3\n2 640 480\n" + lines("255 ", "");
   const bool is_big_endian = encoding == "binary_big_endian";
   append(std::int32_t{3}, is_big_endian, &bytes);
   append(std::uint8_t{2}, is_big_endian, &bytes);
@@ -161,17 +155,6 @@ TEST(PointFile, PointsArePlacedByTheViewpoint) {
   }
 }
 
-// A laser's driver counts in millimetres: no wall is at 400 m.
-TEST(PointFile, WholeNumbersHaveNoUnit) {
-  PointFile file;
-  std::string bytes = pcd("ascii");
-  bytes.replace(bytes.find("TYPE U F"), 8, "TYPE U I");
-  test::expect_says(parse(bytes, &file), "whole numbers");
-  bytes = ply("ascii");
-  bytes.replace(bytes.find("property float x"), 16, "property int x");
-  test::expect_says(parse(bytes, &file), "whole numbers");
-}
-
 // From the camera, the points are 3.29, 7.43 and 8.77 m away; from the origin of the frame in which
 // the VIEWPOINT is stated, 5 to 15 m.
 TEST(PointFile, RangesCountFromTheViewpoint) {
@@ -185,31 +168,16 @@ TEST(PointFile, RangesCountFromTheViewpoint) {
   EXPECT_EQ(Obstacles::from_file(path, config).size(), 2U);
 }
 
-TEST(PointFile, ASurfaceIsNotItsCorners) {
-  for (const std::string name : {"face", "tristrips"}) {
-    std::string bytes = ply("ascii");
-    bytes.replace(bytes.find("element face 0"), 14, "element " + name + " 1");
-    PointFile file;
-    test::expect_says(parse(bytes + "3 0 1 2\n", &file), "Sample the surface");
-  }
-  for (const std::string element :
-       {"polygon 1\nproperty list uchar int vertex_index", "edge 1\nproperty int vertex1"}) {
-    std::string bytes = ply("ascii");
-    const std::string face = "face 0\nproperty list uchar int vertex_indices";
-    bytes.replace(bytes.find(face), face.size(), element);
-    PointFile file;
-    test::expect_says(parse(bytes + "1 0\n", &file), "Sample the surface");
-  }
-}
-
 // What a file says beside its points is used or refused by name: points that are dropped are free
-// space, and a length in millimetres is not one in metres.
+// space, a surface is not its corners, and a laser's driver that writes whole numbers counts in
+// millimetres: no wall is at 400 m.
 TEST(PointFile, WhatIsNotUnderstoodIsRefused) {
   struct Case {
     std::string bytes, from, to, what;
   };
   const std::string more = "7 0.1 0.1 0.1 1 2 3\n";
-  const std::string point(8 + 3 * 8 + 4 + 2, '\0');
+  const std::string point(8 + 3 * 8 + 4 + 2, '\0'),
+      surface = "Sample the surface", face = "face 0\nproperty list uchar int vertex_indices";
   for (const auto& [bytes, from, to, what] : std::initializer_list<Case>{
            {pcd("ascii") + more, "", "", "holds more"},
            {pcd("binary") + point, "", "", "holds more"},
@@ -219,7 +187,13 @@ TEST(PointFile, WhatIsNotUnderstoodIsRefused) {
            {pcd("ascii"), "WIDTH 2", "WIDTH 1\nWIDTH 2", "two lines WIDTH"},
            {pcd("ascii"), "VIEWPOINT", "viewpoint", "'viewpoint'"},
            {pcd("ascii"), "U F F F", "U I F F", "whole numbers"},
+           {ply("ascii"), "property float x", "property int x", "whole numbers"},
            {ply("ascii"), "property double y", "property int y", "whole numbers"},
+           {ply("ascii") + "3 0 1 2\n", "face 0", "face 1", surface},
+           {ply("ascii") + "3 0 1 2\n", "face 0", "tristrips 1", surface},
+           {ply("ascii") + "1 0\n", face, "polygon 1\nproperty list uchar int vertex_index",
+            surface},
+           {ply("ascii") + "1 0\n", face, "edge 1\nproperty int vertex1", surface},
            {ply("ascii"), "element camera", "element vertex", "more than one element"},
            {ply("ascii"), "2 640", "-2 640", "damaged in its element 'camera'"}}) {
     std::string changed = bytes;
