@@ -8,17 +8,16 @@
 #include <memory>
 #include <vector>
 
-#include "internal/cloud/point_bvh.h"
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/distance_fields.h"
 #include "support/hostile_meshes.h"
 #include "support/meshes.h"
-#include "support/oracle.h"
 #include "support/random_links.h"
 #include "support/random_numbers.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/shape_oracle.h"
 #include "support/trial.h"
 
 namespace ist {
@@ -54,17 +53,9 @@ class NoTime : public ::testing::Test {
   }
 
   double truth(std::size_t link) const {
-    Points points_L;
-    for (const CloudSnapshot* cloud : {&wall_, &near_}) {
-      const PointBvh& bvh = cloud->index.bvh();
-      const Eigen::Isometry3d X_LO = X_FL_[link].inverse() * bvh.X_FO();
-      for (std::size_t tile = 0; tile < bvh.tile_count(); ++tile) {
-        PointTile scratch;
-        const PointTile& points = bvh.tile(tile, &scratch);
-        for (int k = 0; k < points.count; ++k) points_L.push_back(X_LO * points.point(k));
-      }
-    }
-    return test::oracle_minimum(meshes_[link], points_L);
+    const LinkGeometry geometry = test::one(meshes_[link]);
+    return std::min(test::oracle_minimum(geometry, X_FL_[link], test::stored_points(wall_.index)),
+                    test::oracle_minimum(geometry, X_FL_[link], test::stored_points(near_.index)));
   }
 
   test::Rng rng_{163};

@@ -7,11 +7,11 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "ist_proximity/octomap.h"
@@ -24,7 +24,7 @@ namespace ist {
 namespace {
 
 using test::expect_says;
-using Leaf = std::tuple<double, double, double, double>;
+using Leaf = std::array<double, 4>;  // [m] its middle and size
 
 // Scattered leaves, a solid block (whose leaves merge into large ones), free space.
 octomap::OcTree random_tree(test::Rng* rng, double resolution, int points) {
@@ -47,7 +47,7 @@ std::vector<Leaf> leaves_of(const octomap::OcTree& tree) {
   std::vector<Leaf> leaves;
   for (auto leaf = tree.begin_leafs(); leaf != tree.end_leafs(); ++leaf) {
     if (tree.isNodeOccupied(*leaf)) {
-      leaves.emplace_back(leaf.getX(), leaf.getY(), leaf.getZ(), leaf.getSize());
+      leaves.push_back({leaf.getX(), leaf.getY(), leaf.getZ(), leaf.getSize()});
     }
   }
   std::sort(leaves.begin(), leaves.end());
@@ -57,19 +57,17 @@ std::vector<Leaf> leaves_of(const octomap::OcTree& tree) {
 void expect_same(const Octree& octree, const octomap::OcTree& tree) {
   std::vector<Leaf> found;
   for (const Eigen::AlignedBox3d& box : octree.occupied) {
-    const Eigen::Vector3d c = box.center();
     // The rounding of octomap, which computes in float.
-    const auto rounded = [](double v) { return static_cast<double>(static_cast<float>(v)); };
-    found.emplace_back(rounded(c.x()), rounded(c.y()), rounded(c.z()), box.sizes().x());
+    const Eigen::Vector3d c = box.center().cast<float>().cast<double>();
+    found.push_back({c.x(), c.y(), c.z(), box.sizes().x()});
   }
   std::sort(found.begin(), found.end());
   const std::vector<Leaf> truth = leaves_of(tree);
   ASSERT_EQ(found.size(), truth.size());
   for (std::size_t i = 0; i < truth.size(); ++i) {
-    ASSERT_NEAR(std::get<0>(found[i]), std::get<0>(truth[i]), 1e-6);
-    ASSERT_NEAR(std::get<1>(found[i]), std::get<1>(truth[i]), 1e-6);
-    ASSERT_NEAR(std::get<2>(found[i]), std::get<2>(truth[i]), 1e-6);
-    ASSERT_NEAR(std::get<3>(found[i]), std::get<3>(truth[i]), 1e-9);
+    for (std::size_t k = 0; k < 4; ++k) {
+      ASSERT_NEAR(found[i][k], truth[i][k], k < 3 ? 1e-6 : 1e-9);
+    }
   }
   // The tree itself is the same obstacles, in the same order, to the bit.
   const std::vector<Eigen::AlignedBox3d> boxes = occupied_boxes(tree);
@@ -87,14 +85,15 @@ std::string bytes_of(const octomap::OcTree& tree, bool is_binary) {
 }
 
 std::string read(const std::string& bytes, bool is_binary, Octree* octree,
-                 const std::string& id = "OcTree", double resolution = 0.05) {
+                 const std::string& id = "OcTree", double resolution = 0.05,
+                 const OctreeLimits& limits = {}) {
   OctreeData data;
   data.id = id;
   data.is_binary = is_binary;
   data.resolution = resolution;
   data.data = reinterpret_cast<const std::uint8_t*>(bytes.data());
   data.size = bytes.size();
-  return read_octree(data, octree);
+  return read_octree(data, octree, limits);
 }
 
 TEST(ReadOctree, LeavesOfEverySize) {
@@ -228,21 +227,15 @@ TEST(ReadOctree, StopsAtTheLargestNumberOfLeaves) {
   ASSERT_EQ(read(bytes, true, &octree), "");
   const std::size_t leaves = 262144;  // 8^6
   EXPECT_EQ(octree.occupied.size(), leaves);
-  OctreeData data;
-  data.id = "OcTree";
-  data.is_binary = true;
-  data.resolution = 0.05;
-  data.data = reinterpret_cast<const std::uint8_t*>(bytes.data());
-  data.size = bytes.size();
   OctreeLimits limits;
   limits.max_leaves = leaves;
-  EXPECT_EQ(read_octree(data, &octree, limits), "");
+  EXPECT_EQ(read(bytes, true, &octree, "OcTree", 0.05, limits), "");
   limits.max_leaves = leaves - 1;
-  expect_says(read_octree(data, &octree, limits), "262143 (max_leaves)");
+  expect_says(read(bytes, true, &octree, "OcTree", 0.05, limits), "262143 (max_leaves)");
   EXPECT_LE(octree.occupied.size(), limits.max_leaves);
   limits = {};
   limits.max_bytes = bytes.size() - 1;
-  expect_says(read_octree(data, &octree, limits),
+  expect_says(read(bytes, true, &octree, "OcTree", 0.05, limits),
               std::to_string(bytes.size()) + " bytes, allowed are at most");
 }
 

@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "support/meshes.h"
-#include "support/oracle.h"
+#include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/shape_oracle.h"
 
 namespace ist {
 namespace {
@@ -37,19 +38,6 @@ std::vector<Eigen::Vector3d> random_points(test::Rng* rng, int count) {
   return points;
 }
 
-std::vector<Eigen::Isometry3d> random_poses(test::Rng* rng, std::size_t links) {
-  std::vector<Eigen::Isometry3d> X_FL(links);
-  for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(rng, 0.4);
-  return X_FL;
-}
-
-double truth_of(const TriangleMesh& mesh, const Eigen::Isometry3d& X_FL,
-                const std::vector<Eigen::Vector3d>& points_F) {
-  std::vector<Eigen::Vector3d> points_L;
-  for (const Eigen::Vector3d& p : points_F) points_L.push_back(X_FL.inverse() * p);
-  return test::oracle_minimum(mesh, points_L);
-}
-
 // The margin is taken off the bound of every link, that of the nearest and of those that a
 // tolerance leaves unsearched because they can hardly be nearer.
 TEST(RobotMinimum, KeepsTheMargin) {
@@ -63,10 +51,11 @@ TEST(RobotMinimum, KeepsTheMargin) {
   for (int scene = 0; scene < test::scaled(200); ++scene) {
     const std::vector<Eigen::Vector3d> points = random_points(&rng, 20);
     const CloudSnapshot cloud = test::make_snapshot(points);
-    const std::vector<Eigen::Isometry3d> X_FL = random_poses(&rng, meshes.size());
+    std::vector<Eigen::Isometry3d> X_FL(meshes.size());
+    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.4);
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < meshes.size(); ++i) {
-      least = std::min(least, truth_of(meshes[i], X_FL[i], points));
+      least = std::min(least, test::oracle_minimum(test::one(meshes[i]), X_FL[i], points));
     }
     ProximityQuery query(model, config);
     RobotProximity robot;

@@ -12,10 +12,11 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/meshes.h"
-#include "support/oracle.h"
+#include "support/random_links.h"
 #include "support/random_robots.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/shape_oracle.h"
 
 namespace ist {
 namespace {
@@ -133,13 +134,6 @@ CroppedScene random_cropped_scene(test::Rng* rng) {
   return scene;
 }
 
-double true_distance(const TriangleMesh& mesh, const Eigen::Isometry3d& X_FL,
-                     const std::vector<Eigen::Vector3d>& points) {
-  std::vector<Eigen::Vector3d> points_L;
-  for (const Eigen::Vector3d& p : points) points_L.push_back(X_FL.inverse() * p);
-  return test::oracle_minimum(mesh, points_L);
-}
-
 // Whether all points within max_distance of a link are in the region.
 bool is_inside(const InnerSphereTree& tree, const Eigen::Isometry3d& X_FL,
                const RegionOfInterest& region, double max_distance) {
@@ -177,7 +171,7 @@ TEST(RegionOfInterest, BoundsHoldForDiscardedPoints) {
     bool all_inside = true;
     for (std::size_t i = 0; i < meshes.size(); ++i) {
       X_FL.push_back(test::random_pose(&rng, 0.8));
-      const double truth = true_distance(meshes[i], X_FL[i], points);
+      const double truth = test::oracle_minimum(test::one(meshes[i]), X_FL[i], points);
       least = std::min(least, truth);
       LinkProximity link;
       ASSERT_TRUE(query.run_link(i, X_FL[i], {&cloud}, &link));
@@ -213,8 +207,7 @@ TEST(RegionOfInterest, CountsInAnswersThatAreRepeated) {
   for (const double deadline : {0.0, 10.0}) {
     config.deadline = deadline;
     ProximityQuery query(model, config);
-    const std::vector<Eigen::Isometry3d> X_FL(
-        1, Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.9, 0.0)));
+    const std::vector<Eigen::Isometry3d> X_FL = {test::at(0.0, 0.9, 0.0)};
     std::vector<LinkProximity> first, again;
     ASSERT_TRUE(query.run(X_FL, {true}, {&cloud}, &first));
     EXPECT_EQ(query.statistics().outside_region, 1U);

@@ -15,6 +15,7 @@
 #include "support/box_oracle.h"
 #include "support/exact_distance.h"
 #include "support/meshes.h"
+#include "support/robot_of_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/shape_oracle.h"
@@ -236,11 +237,8 @@ TEST(DriftedPose, NoLowerBoundIsAboveTheTruthInADriftedMap) {
   for (int i = 0; i < test::scaled(20000); ++i) {
     const Point middle = test::random_vector(&rng, 2.0);
     const Eigen::AlignedBox3d box(middle - Point::Constant(0.05), middle + Point::Constant(0.05));
-    CloudSnapshot cloud;
-    auto index = std::make_shared<BoxIndex>();
-    index->build({box});
-    cloud.boxes = index;
-    cloud.X_FM = drifted(test::random_pose(&rng, 1.0), i, &rng);
+    const CloudSnapshot cloud =
+        test::make_map({box}, drifted(test::random_pose(&rng, 1.0), i, &rng));
     Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
     X_FL.translation() = cloud.X_FM * middle + test::random_vector(&rng, 1.0);
     QueryConfig config;
@@ -262,22 +260,14 @@ TEST(DriftedPose, NoLowerBoundIsAboveTheTruthInADriftedMap) {
 
 TEST(DriftedPose, NoLowerBoundOfAPairIsAboveTheTruth) {
   test::Rng rng(64);
-  RobotDescription description;
   const double radius = 0.4;
-  for (const char* name : {"a", "b"}) {
-    LinkDescription link;
-    link.name = name;
-    Eigen::Isometry3d X_LE = Eigen::Isometry3d::Identity();
-    X_LE.translation() = Point(0, 0, 0.5);
-    link.geometry = {GeometryElement{Sphere{radius}, X_LE, "test"}};
-    description.links.push_back(link);
-  }
-  const std::shared_ptr<const RobotModel> model = build_robot_model(description, {});
+  const Point center(0, 0, 0.5);
+  const LinkGeometry ball = {GeometryElement{Sphere{radius}, test::at(center), "test"}};
+  const auto model = build_robot_model(test::robot_of({ball, ball}), {});
   QueryConfig config;
   config.max_distance = 5.0;
   SelfQuery query(model, {{0, 1}}, config);
   std::vector<PairProximity> results;
-  const Point center(0, 0, 0.5);
   for (int i = 0; i < 20000; ++i) {
     std::vector<Eigen::Isometry3d> X_FL;
     for (int l = 0; l < 2; ++l) X_FL.push_back(drifted(test::random_pose(&rng, 1.5), i, &rng));

@@ -122,16 +122,6 @@ Case random_case(test::Rng* rng, bool is_image, bool has_extent,
   return one;
 }
 
-Ids ids_of(const CloudSnapshot& snapshot) {
-  Ids ids;
-  for (const PointTile& tile : test::tiles_of(snapshot.index)) {
-    for (int k = 0; k < tile.count; ++k) {
-      EXPECT_TRUE(ids.insert(tile.id[k]).second) << "point " << tile.id[k] << " is there twice";
-    }
-  }
-  return ids;
-}
-
 // The group of a point by the first zone that holds it; -2 where rounding decides.
 constexpr int kOpen = -2, kOutside = -1;
 int group_of(const Case& one, std::uint32_t id, const PointExtent& extent) {
@@ -164,8 +154,9 @@ TEST(Zone, eachPointIsInTheGroupOfTheFirstZoneThatHoldsIt) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const CloudSnapshot whole = one.take_in(Zone::kNone, {});
     const CloudSnapshot free = one.take_in(Zone::kNone, one.zones);
-    const Ids all = ids_of(whole), kept = ids_of(free);
-    const Ids groups[] = {ids_of(one.take_in(0, one.zones)), ids_of(one.take_in(1, one.zones))};
+    const Ids all = test::ids_of(whole.index), kept = test::ids_of(free.index);
+    const Ids groups[] = {test::ids_of(one.take_in(0, one.zones).index),
+                          test::ids_of(one.take_in(1, one.zones).index)};
     const IngestCounts& counts = free.counts;
     EXPECT_EQ(counts.in_zones + counts.used + counts.on_robot,
               whole.counts.used + whole.counts.on_robot);
