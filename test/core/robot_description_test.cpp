@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "internal/robot/mesh_size.h"
-#include "ist_proximity/geometry/error.h"
 #include "support/errors.h"
 #include "support/mesh_files.h"
 #include "support/meshes.h"
@@ -20,6 +19,8 @@
 
 namespace ist {
 namespace {
+
+using test::expect_says;
 
 std::string robot(const std::string& content) {
   return "<?xml version=\"1.0\"?>\n<robot name=\"test\">" + content + "</robot>";
@@ -46,12 +47,7 @@ RobotDescription parse(const std::string& urdf,
 }
 
 std::string structure_error(const std::string& urdf) {
-  try {
-    parse(urdf);
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "(no error)";
+  return test::error_of([&] { parse(urdf); });
 }
 
 // The error of the link under test; the valid link must be read all the same.
@@ -63,11 +59,9 @@ std::string link_error(const std::string& content) {
   EXPECT_EQ(description.links[1].name, "tried");
   EXPECT_TRUE(description.links[1].geometry.empty());
   const std::string error = description.links[1].error;
-  EXPECT_NE(error.find("link 'tried'"), std::string::npos) << error;
+  expect_says(error, "link 'tried'");
   return error;
 }
-
-using test::expect_says;
 
 TEST(RobotDescription, readsShapesAndOrigins) {
   const RobotDescription description = parse(
@@ -138,12 +132,6 @@ TEST(RobotDescription, fallsBackToVisualGeometry) {
   EXPECT_EQ(as_visual.links_without_geometry, std::vector<std::string>{"good"});
 }
 
-TEST(RobotDescription, aFaultyCollisionElementIsNotReplacedByTheVisual) {
-  expect_says(link_error(collision("<sphere radius=\"0\"/>") +
-                         "<visual><geometry><sphere radius=\"0.2\"/></geometry></visual>"),
-              "radius is 0 m");
-}
-
 TEST(RobotDescription, ignoresElementsThatAreNoGeometry) {
   const RobotDescription description = parse(robot(
       "<material/><material name=\"x\"><color rgba=\"red\"/></material><gazebo><link/></gazebo>"
@@ -153,7 +141,11 @@ TEST(RobotDescription, ignoresElementsThatAreNoGeometry) {
   EXPECT_EQ(description.links[0].error, "");
 }
 
+// A faulty collision element is not replaced by the visual.
 TEST(RobotDescription, saysWhatIsWrongWithAnElement) {
+  expect_says(link_error(collision("<sphere radius=\"0\"/>") +
+                         "<visual><geometry><sphere radius=\"0.2\"/></geometry></visual>"),
+              "radius is 0 m");
   expect_says(link_error("<collision/>"), "no <geometry>");
   expect_says(link_error("<collision><geometry/></collision>"), "collision element 1");
   expect_says(link_error(collision("<capsule radius=\"1\"/>")), "'capsule'");
