@@ -86,7 +86,7 @@ bool has_unknown(const Braking& braking) {
 TEST(StoppingReach, nothingOnTheWayIsNearer) {
   test::Rng rng(4711);
   int cases = 0, unknown = 0;
-  std::vector<double> shares_of_reach;
+  double largest_share = 0.0;  // of its reach that a link used
   for (int i = 0; i < test::scaled(10000); ++i) {
     const Braking braking = random_braking(&rng);
     if (has_unknown(braking)) {
@@ -116,17 +116,13 @@ TEST(StoppingReach, nothingOnTheWayIsNearer) {
       const std::size_t body = braking.arm.bodies[link];
       const double way = moved(braking.boxes[link], X_FB_here[body], X_FB_end[body]);
       ASSERT_LE(way, reach + 1e-12) << "case " << i << ", link " << link;
-      if (reach > 0.01) shares_of_reach.push_back(way / reach);
+      if (reach > 0.01) largest_share = std::max(largest_share, way / reach);
       ++cases;
     }
   }
   EXPECT_GT(cases, test::scaled(10000));
   EXPECT_GT(unknown, test::scaled(200));  // those with a floating joint
-  std::sort(shares_of_reach.begin(), shares_of_reach.end());
-  EXPECT_GT(shares_of_reach.back(), 0.9);
-  RecordProperty("cases", cases);
-  RecordProperty("share_1_in_20", std::to_string(shares_of_reach[shares_of_reach.size() / 20]));
-  RecordProperty("median_share", std::to_string(shares_of_reach[shares_of_reach.size() / 2]));
+  EXPECT_GT(largest_share, 0.9);
 }
 
 // Two joints that turn about z, the second one 1 m along x.

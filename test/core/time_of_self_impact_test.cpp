@@ -8,11 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "support/link_pair_oracle.h"
 #include "support/motions.h"
 #include "support/random_robots.h"
 #include "support/sanitizers.h"
-#include "support/shape_oracle.h"
+#include "support/world_oracle.h"
 
 namespace ist {
 namespace {
@@ -21,23 +20,11 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // A robot of boxes and spheres, whose distances have closed forms or few triangles.
 test::Arm arm_of_boxes_and_spheres(test::Rng* rng) {
-  static const std::vector<Shape> kShapes = {Box{{0.1, 0.06, 0.3}}, Sphere{0.08},
-                                             Box{{0.2, 0.2, 0.02}}};
-  static const auto shapes = test::make_model({kShapes[0], kShapes[1], kShapes[2]}, 0.01);
+  static const test::LinkShapes kShapes(
+      {Box{{0.1, 0.06, 0.3}}, Sphere{0.08}, Box{{0.2, 0.2, 0.02}}});
   RobotDescription robot = test::random_robot(rng, 6);
   for (JointDescription& joint : robot.joints) joint.X_PJ.translation() *= 0.25;
-  test::Arm arm;
-  const auto model = std::make_shared<RobotModel>();
-  arm.kinematics = std::make_shared<Kinematics>(robot);
-  for (std::size_t i = 1; i < arm.kinematics->bodies().size(); ++i) {
-    const auto shape = static_cast<std::size_t>(test::uniform(rng, 0, 2.999));
-    model->links.push_back(shapes->links[shape]);
-    model->links.back().name = arm.kinematics->bodies()[i];
-    arm.links.push_back({GeometryElement{kShapes[shape], Eigen::Isometry3d::Identity(), "test"}});
-    arm.bodies.push_back(i);
-  }
-  arm.model = model;
-  return arm;
+  return test::arm_of(robot, kShapes, rng);
 }
 
 std::vector<LinkPair> all_pairs(const test::Arm& arm) {
@@ -48,59 +35,16 @@ std::vector<LinkPair> all_pairs(const test::Arm& arm) {
   return pairs;
 }
 
-using Groups = std::vector<test::TriangleGroups>;
-
-// [m] The distance of two links, the second one posed; 0 or less in contact.
-double link_distance(const test::Arm& arm, const Groups& groups, const LinkPair& pair,
-                     const Eigen::Isometry3d& X_AB) {
-  const LinkGeometry &a = arm.links[pair.first], &b = arm.links[pair.second];
-  if (const auto* ball = std::get_if<Sphere>(&b[0].shape)) {
-    return test::oracle_signed_distance(a, X_AB.translation()) - ball->radius;
-  }
-  if (const auto* ball = std::get_if<Sphere>(&a[0].shape)) {
-    return test::oracle_signed_distance(b, X_AB.inverse().translation()) - ball->radius;
-  }
-  const test::TriangleGroups &of_a = groups[pair.first], &of_b = groups[pair.second];
-  const bool touch = of_a.holds_part_of(of_b, X_AB) || of_b.holds_part_of(of_a, X_AB.inverse());
-  return touch ? 0.0 : of_a.distance(of_b, X_AB);
-}
-
-// No less than link_distance() less the sizes of both: cheap, to spare samples.
-double distance_at_least(const LinkGeometry& a, const LinkGeometry& b,
-                         const Eigen::Isometry3d& X_AB) {
-  const auto radius = [](const LinkGeometry& link) {
-    const auto* box = std::get_if<Box>(&link[0].shape);
-    return box ? 0.5 * box->size.norm() : std::get<Sphere>(link[0].shape).radius;
-  };
-  return X_AB.translation().norm() - radius(a) - radius(b);
-}
-
-// [s] The first contact that samples find, at least every half millisecond where the links are
-// close, then bisection; +inf without any. No two points approach at more than 40 m/s.
-double sampled_impact(const test::Arm& arm, const Groups& groups, const test::ArmMotion& motion,
-                      const LinkPair& pair) {
-  constexpr double kStep = 5e-4, kFastest = 40.0;
+// [s] The first contact of two links by samples; +inf without any.
+double sampled_impact(const test::Arm& arm, const std::vector<test::OracleSolid>& solids,
+                      const test::ArmMotion& motion, const LinkPair& pair) {
   const auto distance = [&](double time) {
     const auto X_FB = test::sampled_poses(arm, motion, time);
     const Eigen::Isometry3d X_AB =
         X_FB[arm.bodies[pair.first]].inverse() * X_FB[arm.bodies[pair.second]];
-    const double far = distance_at_least(arm.links[pair.first], arm.links[pair.second], X_AB);
-    return far > 0.05 ? far : link_distance(arm, groups, pair, X_AB);
+    return solids[pair.first].distance(solids[pair.second], X_AB, kInf);
   };
-  double before = 0.0;
-  for (double time = 0.0; time <= motion.joints.duration;) {
-    const double now = distance(time);
-    if (now <= 0.0) {
-      while (time - before > 1e-9) {
-        const double middle = 0.5 * (before + time);
-        (distance(middle) <= 0.0 ? time : before) = middle;
-      }
-      return time;
-    }
-    before = time;
-    time += std::max(kStep, now / kFastest);
-  }
-  return kInf;
+  return test::sampled_contact(distance, motion.joints.duration);
 }
 
 // The time is never later than the one that dense sampling finds, and for 99 % of the
@@ -113,8 +57,7 @@ TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
     const test::Arm arm = arm_of_boxes_and_spheres(&rng);
     const std::vector<LinkPair> pairs = all_pairs(arm);
     if (pairs.empty()) continue;
-    Groups groups;
-    for (const LinkGeometry& link : arm.links) groups.emplace_back(test::triangles_of(link));
+    const std::vector<test::OracleSolid> solids(arm.links.begin(), arm.links.end());
     QueryConfig config;
     config.max_distance = 0.5;
     TimeOfSelfImpact impacts(arm.model, arm.kinematics, pairs, config);
@@ -128,7 +71,7 @@ TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
       impacts.run(motion.joints, motion.still, std::vector<bool>(pairs.size(), true), &found);
       ++motions;
       for (std::size_t k = 0; k < pairs.size(); ++k) {
-        const double truth = sampled_impact(arm, groups, motion, pairs[k]);
+        const double truth = sampled_impact(arm, solids, motion, pairs[k]);
         if (truth == 0.0) {
           EXPECT_EQ(found[k].time, 0.0);
           continue;
@@ -138,9 +81,6 @@ TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
       }
     }
   }
-  RecordProperty("pairs", counts.all);
-  RecordProperty("contacts", counts.contacts);
-  RecordProperty("close", counts.close);
   EXPECT_EQ(counts.late, 0);
   EXPECT_GE(counts.close, 0.99 * counts.all);
   EXPECT_LE(counts.alarms, 0.01 * counts.all);

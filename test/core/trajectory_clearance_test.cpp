@@ -83,8 +83,7 @@ Scene random_scene(test::Rng* rng, const test::Arm& arm) {
   }
   for (Eigen::Vector3d& point : scene.motion.points) {
     const double when = test::uniform(rng, scene.path.times.front() + 0.2, scene.end() + 0.3);
-    const auto body = arm.bodies[static_cast<std::size_t>(test::uniform(rng, 0, 0.999) *
-                                                          static_cast<double>(arm.size()))];
+    const std::size_t body = arm.bodies[test::random_link(rng, arm)];
     const auto poses = test::sampled_poses(arm, scene.at(std::min(when, scene.end())), 0.5);
     point = poses[body] * test::random_vector(rng, 0.1);
   }
@@ -279,11 +278,9 @@ TEST(TrajectoryClearance, obstaclesThatComeNearer) {
   scene.path.positions.resize(2);
   const CloudSnapshot cloud = test::make_snapshot(scene.motion.points);
   const double speed = 0.5, age = 0.1;
-  std::vector<LinkClearance> found;
-  impacts.run(straight_pieces(scene.path), from, scene.motion.still, scene.motion.X_FR,
-              std::vector<bool>(arm.size(), true), {&cloud}, {}, speed, age, &found);
-  double first = kInf;
-  for (const LinkClearance& one : found) first = std::min(first, one.contact_time);
+  const double first = clearance_of(&impacts, straight_pieces(scene.path), scene,
+                                    {from, speed, age}, cloud, arm.size())
+                           .contact_time;
   EXPECT_NEAR(first, from + distance / speed - age, 0.01);
   EXPECT_LE(first, from + distance / speed - age);
 }
@@ -364,11 +361,13 @@ TEST(TrajectoryClearance, whatIsNotKnownIsNotFree) {
   }
 }
 
-TEST(TrajectoryClearance, gradientsOfTheDistanceWhereItIsLeast) {
-  const Robot robot(R"(<robot name="one"><link name="base"/>
+constexpr const char* kSlide = R"(<robot name="one"><link name="base"/>
     <link name="ball"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
     <joint name="slide" type="prismatic"><parent link="base"/><child link="ball"/>
-      <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>)");
+      <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>)";
+
+TEST(TrajectoryClearance, gradientsOfTheDistanceWhereItIsLeast) {
+  const Robot robot(kSlide);
   const JointTrajectory path{{0.0, 1.0}, {{0.0}, {0.2}}, {}, {}};
   const Eigen::Vector3d point(0.5, 0.4, 0.0);
   const Obstacles obstacles(std::vector<Eigen::Vector3d>{point});
@@ -382,10 +381,7 @@ TEST(TrajectoryClearance, gradientsOfTheDistanceWhereItIsLeast) {
 
 // Velocities whose sums overflow leave no bound of where the joint is.
 TEST(TrajectoryClearance, hugeNumbersAreNotFree) {
-  const Robot robot(R"(<robot name="one"><link name="base"/>
-    <link name="ball"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
-    <joint name="slide" type="prismatic"><parent link="base"/><child link="ball"/>
-      <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>)");
+  const Robot robot(kSlide);
   const Obstacles obstacles(std::vector<Eigen::Vector3d>{{0.5, 0.0, 0.0}});
   for (const double huge : {1e3, 1e12, 1e100, 1e308}) {
     for (const double sign : {-1.0, 1.0}) {

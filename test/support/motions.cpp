@@ -4,16 +4,31 @@
 #include <cmath>
 #include <limits>
 
+#include "support/random_links.h"
 #include "support/random_robots.h"
 #include "support/shape_oracle.h"
 
 namespace ist::test {
 
+Arm arm_of(const RobotDescription& robot, const LinkShapes& shapes, Rng* rng) {
+  Arm arm;
+  const auto model = std::make_shared<RobotModel>();
+  arm.kinematics = std::make_shared<Kinematics>(robot);
+  const double last = static_cast<double>(shapes.shapes.size()) - 0.001;
+  for (std::size_t i = 1; i < arm.kinematics->bodies().size(); ++i) {
+    const auto shape = static_cast<std::size_t>(uniform(rng, 0, last));
+    model->links.push_back(shapes.packed->links[shape]);
+    model->links.back().name = arm.kinematics->bodies()[i];
+    arm.links.push_back(one(shapes.shapes[shape]));
+    arm.bodies.push_back(i);
+  }
+  arm.model = model;
+  return arm;
+}
+
 Arm random_arm(Rng* rng) {
-  static const auto shapes = make_model(
-      {Box{{0.1, 0.06, 0.3}}, Cylinder{0.05, 0.25}, Sphere{0.08}, Box{{0.2, 0.2, 0.02}}}, 0.01);
-  static const std::vector<Shape> kShapes = {Box{{0.1, 0.06, 0.3}}, Cylinder{0.05, 0.25},
-                                             Sphere{0.08}, Box{{0.2, 0.2, 0.02}}};
+  static const LinkShapes kShapes(
+      {Box{{0.1, 0.06, 0.3}}, Cylinder{0.05, 0.25}, Sphere{0.08}, Box{{0.2, 0.2, 0.02}}});
   RobotDescription robot = random_robot(rng, 5);
   for (JointDescription& joint : robot.joints) joint.X_PJ.translation() *= 0.4;
   if (uniform(rng, 0, 1) < 0.1 && robot.joints.size() > 1) {
@@ -23,19 +38,11 @@ Arm random_arm(Rng* rng) {
       if (joint.mimic && joint.mimic->joint == first.name) joint.mimic.reset();
     }
   }
-  Arm arm;
-  auto model = std::make_shared<RobotModel>();
-  const auto kinematics = std::make_shared<Kinematics>(robot);
-  for (std::size_t i = 1; i < kinematics->bodies().size(); ++i) {
-    const auto shape = static_cast<std::size_t>(uniform(rng, 0, 3.999));
-    model->links.push_back(shapes->links[shape]);
-    model->links.back().name = kinematics->bodies()[i];
-    arm.links.push_back({GeometryElement{kShapes[shape], Eigen::Isometry3d::Identity(), "test"}});
-    arm.bodies.push_back(i);
-  }
-  arm.model = model;
-  arm.kinematics = kinematics;
-  return arm;
+  return arm_of(robot, kShapes, rng);
+}
+
+std::size_t random_link(Rng* rng, const Arm& arm) {
+  return static_cast<std::size_t>(uniform(rng, 0, 0.999) * static_cast<double>(arm.size()));
 }
 
 std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMotion& motion, double time) {
@@ -76,8 +83,7 @@ ArmMotion random_motion(Rng* rng, const Arm& arm) {
   }
   const int count = 1 + static_cast<int>(uniform(rng, 0, 5));
   for (int i = 0; i < count; ++i) {
-    const std::size_t body = arm.bodies[static_cast<std::size_t>(uniform(rng, 0, 0.999) *
-                                                                 static_cast<double>(arm.size()))];
+    const std::size_t body = arm.bodies[random_link(rng, arm)];
     const double time = uniform(rng, 0.3, 1.2) * motion.joints.duration;
     motion.points.push_back(sampled_poses(arm, motion, time)[body] * random_vector(rng, 0.1));
   }
@@ -93,24 +99,27 @@ double sampled_distance(const Arm& arm, const ArmMotion& motion, double time) {
   return smallest;
 }
 
-double sampled_impact(const Arm& arm, const ArmMotion& motion) {
+double sampled_contact(const std::function<double(double)>& distance, double end) {
   constexpr double kStep = 5e-4, kFastest = 40.0;
-  const auto in_contact = [&](double time) { return sampled_distance(arm, motion, time) <= 0.0; };
   double before = 0.0;
-  for (double time = 0.0; time <= motion.joints.duration;) {
-    const double distance = sampled_distance(arm, motion, time);
-    if (distance <= 0.0) {
-      if (time == 0.0) return 0.0;
+  for (double time = 0.0; time <= end;) {
+    const double now = distance(time);
+    if (now <= 0.0) {
       while (time - before > 1e-9) {
         const double middle = 0.5 * (before + time);
-        (in_contact(middle) ? time : before) = middle;
+        (distance(middle) <= 0.0 ? time : before) = middle;
       }
       return time;
     }
     before = time;
-    time += kStep * std::max(1.0, std::floor(distance / (kFastest * kStep)));
+    time += kStep * std::max(1.0, std::floor(now / (kFastest * kStep)));
   }
   return std::numeric_limits<double>::infinity();
+}
+
+double sampled_impact(const Arm& arm, const ArmMotion& motion) {
+  return sampled_contact([&](double time) { return sampled_distance(arm, motion, time); },
+                         motion.joints.duration);
 }
 
 void ImpactCounts::add(double found, double truth) {

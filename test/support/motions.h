@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -26,8 +27,23 @@ struct ArmMotion {
   std::vector<Eigen::Vector3d> points;  ///< [m] in the fixed frame
 };
 
+/// Shapes of links, packed.
+struct LinkShapes {
+  explicit LinkShapes(const std::vector<Shape>& all)
+      : shapes(all), packed(make_model(all, 0.01)) {}
+
+  std::vector<Shape> shapes;
+  std::shared_ptr<const RobotModel> packed;
+};
+
+/// A link of a random one of the shapes at each body but the root.
+Arm arm_of(const RobotDescription& robot, const LinkShapes& shapes, Rng* rng);
+
 /// Up to five joints, links about as long as an arm's; a floating joint now and then.
 Arm random_arm(Rng* rng);
+
+/// One of its links.
+std::size_t random_link(Rng* rng, const Arm& arm);
 
 /// X_FB of all bodies, `time` [s] after the start.
 std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMotion& motion, double time);
@@ -39,9 +55,12 @@ ArmMotion random_motion(Rng* rng, const Arm& arm);
 /// Smallest exact distance [m] of any link to any point, `time` [s] after the start.
 double sampled_distance(const Arm& arm, const ArmMotion& motion, double time);
 
-/// [s] The first contact that samples every half millisecond find, then bisection between the last
-/// sample without and the first one with contact; +inf without any. Far from all points some
-/// samples are spared: nothing here is faster than 40 m/s.
+/// [s] The first time until `end` at which `distance` [m] is not positive: samples every half
+/// millisecond, then bisection between the last one without and the first one with contact; +inf
+/// without any. Far away some samples are spared: nothing here is faster than 40 m/s.
+double sampled_contact(const std::function<double(double)>& distance, double end);
+
+/// [s] The first contact of any link and any point, by samples.
 double sampled_impact(const Arm& arm, const ArmMotion& motion);
 
 /// Counts what does not start in contact, by how the time that was found differs from the true one.
