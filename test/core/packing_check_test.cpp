@@ -5,18 +5,18 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "internal/packing/packer.h"
 #include "internal/packing/packing_cache.h"
 #include "ist_proximity/robot/robot_model.h"
-#include "support/data_dir.h"
+#include "support/errors.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
+#include "support/robot_of_links.h"
 #include "support/temp_dir.h"
 
 namespace ist {
@@ -65,8 +65,7 @@ class ForgedPackingTest : public testing::Test {
   void expect_fault(const std::string& part, const Change& change) {
     Packing forged = packing_;
     change(&forged);
-    const std::string fault = packing_fault(shape_, config_, forged);
-    EXPECT_NE(fault.find(part), std::string::npos) << "'" << fault << "' lacks: " << part;
+    test::expect_says(packing_fault(shape_, config_, forged), part);
   }
 
   const Shape shape_ = test::l_shape(0.2, 0.05);
@@ -138,17 +137,14 @@ TEST(PackingCheck, AnInteriorThatIsNotCoveredIsFound) {
   const Packing whole = pack_mesh(mesh, config);
   ASSERT_EQ(packing_fault(mesh, config, whole), "");
   Packing hollow;
-  double area = 0.0;
+  const double area = test::surface_area(mesh);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Eigen::Vector3d &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);
-    const double radius = std::max((b - a).norm(), (c - a).norm());
-    ASSERT_LE(radius, config.max_error);
+    ASSERT_LE(std::max((b - a).norm(), (c - a).norm()), config.max_error);
     hollow.spheres.push_back({a, 0.0, config.max_error});
-    area += 0.5 * (b - a).cross(c - a).norm();
   }
   hollow.certificate = {config.max_error, config.max_error, config.max_error, area, area, true};
-  const std::string fault = packing_fault(mesh, config, hollow);
-  EXPECT_NE(fault.find("do not reach all of the interior"), std::string::npos) << fault;
+  test::expect_says(packing_fault(mesh, config, hollow), "do not reach all of the interior");
   hollow.certificate.interior_gap = 0.2;  // a true statement
   EXPECT_EQ(packing_fault(mesh, config, hollow), "");
 }
@@ -156,12 +152,7 @@ TEST(PackingCheck, AnInteriorThatIsNotCoveredIsFound) {
 // A forged file with a right checksum: it is told, packed again and replaced.
 TEST(PackingCheck, ARobotIsPackedAgainWhereItsCacheIsForged) {
   const test::TempDir dir;
-  RobotDescription robot;
-  robot.links.emplace_back();
-  robot.links[0].name = "arm";
-  robot.links[0].geometry.emplace_back();
-  robot.links[0].geometry[0].shape = test::l_shape(0.2, 0.05);
-  robot.link_order = {"arm"};
+  const RobotDescription robot = test::robot_of({test::one(test::l_shape(0.2, 0.05))});
   RobotModelConfig config;
   config.cache_directory = dir.file("cache");
   std::vector<std::string> warnings;
@@ -182,7 +173,7 @@ TEST(PackingCheck, ARobotIsPackedAgainWhereItsCacheIsForged) {
   EXPECT_FALSE(again->links[0].from_cache);
   EXPECT_EQ(again->links[0].packing.spheres.size(), packed->links[0].packing.spheres.size());
   ASSERT_EQ(warnings.size(), 1U);
-  EXPECT_NE(warnings[0].find("is not used: "), std::string::npos) << warnings[0];
+  test::expect_says(warnings[0], "is not used: ");
   EXPECT_TRUE(build_robot_model(robot, config, callbacks)->links[0].from_cache);
 }
 

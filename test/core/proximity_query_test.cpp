@@ -14,6 +14,7 @@
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/shape_oracle.h"
+#include "support/trial.h"
 
 namespace ist {
 namespace {
@@ -35,29 +36,18 @@ std::vector<Eigen::Vector3d> random_cloud(test::Rng* rng, int kind, int count) {
   const Eigen::Vector3d a = test::random_vector(rng, 0.5), b = test::random_vector(rng, 0.5);
   for (int i = 0; i < count; ++i) {
     const double s = test::uniform(rng, -1, 1), t = test::uniform(rng, -1, 1);
-    switch (kind % 4) {
-      case 0:
-        points.push_back(test::random_vector(rng, 0.6));
-        break;  // a volume
-      case 1:
-        points.push_back(middle + s * a + t * b);
-        break;  // a plane
-      case 2:
-        points.push_back(middle + s * a);
-        break;  // a line
-      default:
-        points.push_back(middle + test::random_vector(rng, 0.05));  // a cluster
-    }
+    // A volume, a plane, a line, a cluster.
+    points.push_back(kind % 4 == 0   ? test::random_vector(rng, 0.6)
+                     : kind % 4 == 1 ? Eigen::Vector3d(middle + s * a + t * b)
+                     : kind % 4 == 2 ? Eigen::Vector3d(middle + s * a)
+                                     : middle + test::random_vector(rng, 0.05));
   }
   return points;
 }
 
 void expect_consistent(const LinkProximity& result, const Eigen::Isometry3d& X_FL) {
   if (result.state < LinkState::kNear) return;
-  EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
-  EXPECT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
-  EXPECT_LT((X_FL * result.p_LCl - result.p_FCl).norm(), 1e-12);
-  EXPECT_EQ(result.state == LinkState::kContact, result.distance < 0.0);
+  test::expect_witness(result, X_FL);
   EXPECT_LE(result.lower_bound, result.distance);
 }
 
@@ -173,18 +163,16 @@ TEST(ProximityQuery, MarginLowersTheBoundAndWidensTheSearch) {
   config.tolerance = 0.0;
   config.margin = 0.05;
   ProximityQuery query(model, config);
-  const std::vector<Eigen::Isometry3d> X_FL(1, Eigen::Isometry3d::Identity());
-  std::vector<LinkProximity> results;
-  const CloudSnapshot near = test::make_snapshot({{0.5, 0, 0}});
-  query.run(X_FL, {true}, {&near}, &results);
-  EXPECT_NEAR(results[0].distance, 0.4, 1e-6);
-  EXPECT_NEAR(results[0].lower_bound, 0.35, 1e-5);
-  const CloudSnapshot edge = test::make_snapshot({{1.12, 0, 0}});
-  query.run(X_FL, {true}, {&edge}, &results);
-  EXPECT_EQ(results[0].state, LinkState::kNear) << "1.02 m less the margin is not proven to be 1 m";
-  const CloudSnapshot far = test::make_snapshot({{1.2, 0, 0}});
-  query.run(X_FL, {true}, {&far}, &results);
-  EXPECT_EQ(results[0].state, LinkState::kClear);
+  const auto answer = [&](double x) {
+    const CloudSnapshot cloud = test::make_snapshot({{x, 0, 0}});
+    std::vector<LinkProximity> results;
+    query.run(std::vector{Eigen::Isometry3d::Identity()}, {true}, {&cloud}, &results);
+    return results[0];
+  };
+  EXPECT_NEAR(answer(0.5).distance, 0.4, 1e-6);
+  EXPECT_NEAR(answer(0.5).lower_bound, 0.35, 1e-5);
+  EXPECT_EQ(answer(1.12).state, LinkState::kNear) << "1.02 m less the margin is not proven 1 m";
+  EXPECT_EQ(answer(1.2).state, LinkState::kClear);
 }
 
 struct Answers {

@@ -17,6 +17,7 @@
 #include "support/distance_fields.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/scene.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -31,25 +32,19 @@ RobotModel coarse_robot() {
 
 // A robot at its poses.
 struct PosedRobot {
-  const RobotModel* model = nullptr;  // null: none
+  const RobotModel* model;
   std::vector<Eigen::Isometry3d> X_FL;
   std::vector<bool> known;
 
-  std::vector<PosedSolid> solids() const {
-    return model == nullptr ? std::vector<PosedSolid>() : posed_solids(*model, X_FL, known);
-  }
+  std::vector<PosedSolid> solids() const { return posed_solids(*model, X_FL, known); }
 };
 
 PosedRobot posed(const RobotModel& model, const Eigen::Vector3d& base = Eigen::Vector3d::Zero()) {
-  PosedRobot robot;
-  robot.model = &model;
-  robot.known.assign(model.links.size(), true);
+  PosedRobot robot{&model, {}, std::vector<bool>(model.links.size(), true)};
   for (std::size_t i = 0; i < model.links.size(); ++i) {
-    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-    X.translation() = base + Eigen::Vector3d(0.0, 0.25 * static_cast<double>(i), 0.1);
-    X.rotate(
-        Eigen::AngleAxisd(0.4 + static_cast<double>(i), Eigen::Vector3d(1, 2, 3).normalized()));
-    robot.X_FL.push_back(X);
+    const auto number = static_cast<double>(i);
+    robot.X_FL.push_back(test::at(base + Eigen::Vector3d(0.0, 0.25 * number, 0.1)) *
+                         Eigen::AngleAxisd(0.4 + number, Eigen::Vector3d(1, 2, 3).normalized()));
   }
   return robot;
 }
@@ -84,10 +79,8 @@ RawCloud raw_of(const std::vector<Eigen::Vector3f>& points) {
 CloudSnapshot ingest(const std::vector<Eigen::Vector3f>& points, const PosedRobot& robot,
                      const IngestConfig& config,
                      const Eigen::Vector3d& base = Eigen::Vector3d::Zero()) {
-  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  X_FS.translation() = base;
   CloudSnapshot snapshot;
-  Ingest(config).run(raw_of(points), X_FS, robot.solids(), 0.0, &snapshot);
+  Ingest(config).run(raw_of(points), test::at(base), robot.solids(), 0.0, &snapshot);
   const IngestCounts& counts = snapshot.counts;
   EXPECT_EQ(counts.received, counts.not_a_number + counts.infinite + counts.out_of_range +
                                  counts.on_robot + counts.used);
@@ -194,8 +187,7 @@ TEST(SelfFilter, anImageIsDecidedByItsBoxes) {
   constexpr std::size_t kWidth = 320, kHeight = 240;
   const RobotModel model = coarse_robot();
   const PosedRobot robot = posed(model);
-  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  X_FS.translation() = Eigen::Vector3d(0.1, 0.2, -1.0);
+  const Eigen::Isometry3d X_FS = test::at(0.1, 0.2, -1.0);
   std::mt19937 random(5);
   std::size_t holes = 0;
   const auto image = std::make_shared<std::vector<float>>();
