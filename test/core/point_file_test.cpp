@@ -185,6 +185,8 @@ TEST(PointFile, WhatIsNotUnderstoodIsRefused) {
            {ply("binary_little_endian") + point, "", "", "holds more"},
            {pcd("ascii"), "WIDTH 2", "UNITS mm\nWIDTH 2", "'UNITS'"},
            {pcd("ascii"), "WIDTH 2", "WIDTH 1\nWIDTH 2", "two lines WIDTH"},
+           {pcd("ascii"), "WIDTH 2", "WIDTH 99999999", "WIDTH"},
+           {pcd("ascii"), "7 0.5", "7 a.b", "point 0"},
            {pcd("ascii"), "VIEWPOINT", "viewpoint", "'viewpoint'"},
            {pcd("ascii"), "U F F F", "U I F F", "whole numbers"},
            {ply("ascii"), "property float x", "property int x", "whole numbers"},
@@ -244,12 +246,6 @@ TEST(PointFile, MessagesNameFileAndFault) {
   test::expect_says(message("b.PCD", pcd("binary").substr(0, 250)), "is cut off");
   test::expect_says(message("c.ply", "solid x"), "is no PLY file");
   test::expect_says(message("d.xyz", "1 2 3"), "extension");
-  std::string huge = pcd("ascii");
-  huge.replace(huge.find("WIDTH 2"), 7, "WIDTH 99999999");
-  test::expect_says(message("e.pcd", huge), "WIDTH");
-  std::string words = pcd("ascii");
-  words.replace(words.find("7 0.5"), 5, "7 a.b");
-  test::expect_says(message("f.pcd", words), "point 0");
   test::expect_says(test::error_of([&] { read_points(folder.file("none.pcd")); }), "none.pcd");
   ASSERT_EQ(mkfifo(folder.file("fifo.ply").c_str(), 0600), 0);
   test::expect_says(test::error_of([&] { read_points(folder.file("fifo.ply")); }), "fifo.ply");

