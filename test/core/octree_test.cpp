@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "ist_proximity/octomap.h"
+#include "support/accuracy.h"
 #include "support/errors.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
@@ -167,9 +168,7 @@ TEST(ReadOctree, RefusesEveryTruncation) {
     }
     const std::string path = folder.file("cut");
     ASSERT_TRUE(is_binary ? tree.writeBinary(path) : tree.write(path));
-    std::ifstream file(path, std::ios::binary);
-    const std::string whole((std::istreambuf_iterator<char>(file)),
-                            std::istreambuf_iterator<char>());
+    const std::string whole = test::read_text(path);
     for (std::size_t n = 0; n < whole.size(); n += 7) {
       std::ofstream(path, std::ios::binary) << whole.substr(0, n);
       ASSERT_NE(read_octree_file(path, &octree), "") << n;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "ist_proximity/robot/robot_description.h"
+#include "support/accuracy.h"
 #include "support/scene.h"
 #include "support/temp_dir.h"
 
@@ -20,15 +21,8 @@ namespace {
 const std::string kArm = std::string(IST_PROXIMITY_SOURCE_DIR) + "/demo/demo_arm.urdf";
 const std::string kMesh = std::string(IST_PROXIMITY_SOURCE_DIR) + "/demo/meshes/shoulder_fork.stl";
 
-std::string read(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 std::vector<std::vector<std::string>> csv_rows(const std::string& path) {
-  std::istringstream lines(read(path));
+  std::istringstream lines(test::read_text(path));
   std::vector<std::vector<std::string>> rows;
   for (std::string line; std::getline(lines, line);) {
     std::istringstream cells(line);
@@ -47,7 +41,7 @@ class PackRobotTest : public testing::Test {
                                 "' '" IST_PROXIMITY_PACK_ROBOT "' " + arguments + " > '" + said +
                                 "' 2>&1";
     const int status = std::system(command.c_str());  // NOLINT(bugprone-command-processor)
-    said_ = read(said);
+    said_ = test::read_text(said);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
   std::string file(const std::string& name) const { return dir_.file(name); }
@@ -74,9 +68,9 @@ TEST_F(PackRobotTest, tableSpheresAndPictureOfARobot) {
     EXPECT_LE(std::stod(rows[i][6]), std::stod(rows[i][5])) << "filled, of the volume";
     if (i > 9) spheres += std::stoul(rows[i][4]);
   }
-  const std::string ply = read(file("a.ply"));
+  const std::string ply = test::read_text(file("a.ply"));
   EXPECT_NE(ply.find("element vertex " + std::to_string(spheres) + "\n"), std::string::npos);
-  EXPECT_EQ(read(file("a.png")).substr(1, 3), "PNG");
+  EXPECT_EQ(test::read_text(file("a.png")).substr(1, 3), "PNG");
 }
 
 // What is inside a link is inside one of its spheres, whichever file they come from.
@@ -87,9 +81,10 @@ TEST_F(PackRobotTest, exportedSpheresContainTheLinks) {
       << said_;
   EXPECT_NE(said_.find("coverage"), std::string::npos) << said_;
   const auto find_package = [](const std::string&) { return IST_PROXIMITY_SOURCE_DIR; };
-  const RobotDescription arm = parse_urdf(read(kArm), GeometrySource::kCollision, find_package);
+  const RobotDescription arm =
+      parse_urdf(test::read_text(kArm), GeometrySource::kCollision, find_package);
   const RobotDescription balls =
-      parse_urdf(read(file("a.urdf")), GeometrySource::kCollision, find_package);
+      parse_urdf(test::read_text(file("a.urdf")), GeometrySource::kCollision, find_package);
   ASSERT_EQ(balls.links.size(), arm.links.size());
   EXPECT_EQ(balls.joints.size(), arm.joints.size());
   test::Rng rng(3);
@@ -112,7 +107,7 @@ TEST_F(PackRobotTest, exportedSpheresContainTheLinks) {
     }
     EXPECT_GT(inside, 2000);
     for (const std::string& name : {file("a.yaml"), file("c.yaml")}) {
-      const std::string text = read(name);
+      const std::string text = test::read_text(name);
       const std::size_t begin = text.find('"' + arm.links[i].name + "\":");
       ASSERT_NE(begin, std::string::npos) << name;
     }
@@ -121,7 +116,7 @@ TEST_F(PackRobotTest, exportedSpheresContainTheLinks) {
     }
   }
   const auto count = [&](const std::string& name) {
-    const std::string text = read(name), what = "radius: ";
+    const std::string text = test::read_text(name), what = "radius: ";
     std::size_t found = 0;
     for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) {
       ++found;
@@ -146,7 +141,7 @@ TEST_F(PackRobotTest, anyNumberOfThreadsGivesTheSameSpheres) {
                     threads + " --ply " + file("a.ply")),
                 0)
           << said_;
-      spheres.push_back(read(file("a.ply")));
+      spheres.push_back(test::read_text(file("a.ply")));
     }
     EXPECT_EQ(spheres[0], spheres[1]) << order;
   }
@@ -159,7 +154,7 @@ TEST_F(PackRobotTest, aMeshIsReadFromTheCacheTheSecondTime) {
   EXPECT_EQ(said_.find("(cache)"), std::string::npos) << said_;
   ASSERT_EQ(run(arguments + file("b.ply")), 0) << said_;
   EXPECT_NE(said_.find("(cache)"), std::string::npos) << said_;
-  EXPECT_EQ(read(file("a.ply")), read(file("b.ply")));
+  EXPECT_EQ(test::read_text(file("a.ply")), test::read_text(file("b.ply")));
 }
 
 TEST_F(PackRobotTest, saysWhatIsWrong) {

@@ -12,7 +12,6 @@
 #include "internal/geometry/triangle_bvh.h"
 #include "internal/packing/packing_check.h"
 #include "internal/packing/packing_report.h"
-#include "ist_proximity/geometry/error.h"
 #include "ist_proximity/geometry/solid.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 #include "support/errors.h"
@@ -40,27 +39,22 @@ TriangleMesh as_loaded(TriangleMesh mesh) {
   return mesh;
 }
 
-// Those that are packed, as they are loaded.
-std::vector<test::HostileMesh> packed_meshes() {
-  std::vector<test::HostileMesh> packed;
-  for (const test::HostileMesh& hostile : test::hostile_meshes()) {
-    if (!hostile.fault.empty()) continue;
-    packed.push_back(hostile);
-    packed.back().mesh = as_loaded(hostile.mesh);
+// [m] The distance of p to the nearest of the spheres with their inner or their cover radius.
+double distance_to(const std::vector<InnerSphere>& spheres, double InnerSphere::*radius,
+                   const Eigen::Vector3d& p) {
+  double least = 1e300;
+  for (const InnerSphere& sphere : spheres) {
+    least = std::min(least, (p - sphere.center).norm() - sphere.*radius);
   }
-  return packed;
+  return least;
 }
 
 // What the certificate says of one point, and the tree's bound.
 void check_point(const TriangleMesh& mesh, const Packing& packing, const InnerSphereTree& tree,
                  const Eigen::Vector3d& p, double rounding) {
   const double truth = test::oracle_signed_distance(mesh, p);
-  double inner = 1e300, cover = 1e300;
-  for (const InnerSphere& sphere : packing.spheres) {
-    const double to_center = (p - sphere.center).norm();
-    inner = std::min(inner, to_center - sphere.radius);
-    cover = std::min(cover, to_center - sphere.cover_radius);
-  }
+  const double inner = distance_to(packing.spheres, &InnerSphere::radius, p);
+  const double cover = distance_to(packing.spheres, &InnerSphere::cover_radius, p);
   const double in_float = tree.cover_distance(p);
   ASSERT_LE(in_float, cover) << "rounding to float may only lower the bound";
   ASSERT_GT(in_float, cover - 1e-5 * (1.0 + p.norm()));
@@ -133,9 +127,10 @@ TEST(PackMesh, HostileMeshesArePackedOrRefused) {
 // Points below the surface, down to a depth of a few gaps, are the hardest to cover.
 TEST(PackMesh, InteriorIsCoveredBelowTheSurface) {
   test::Rng rng(9);
-  for (const test::HostileMesh& hostile : packed_meshes()) {
+  for (const test::HostileMesh& hostile : test::hostile_meshes()) {
+    if (!hostile.fault.empty()) continue;
     SCOPED_TRACE(hostile.name);
-    const TriangleMesh& mesh = hostile.mesh;
+    const TriangleMesh mesh = as_loaded(hostile.mesh);
     const TriangleBvh bvh(mesh);
     const double size = bvh.bounds().sizes().norm();
     PackingConfig config;
@@ -149,11 +144,8 @@ TEST(PackMesh, InteriorIsCoveredBelowTheSurface) {
       const Eigen::Vector3d p = mesh.corner(t, 0) * (1 - u - v) + mesh.corner(t, 1) * u +
                                 mesh.corner(t, 2) * v + test::random_vector(&rng, 4.0 * gap);
       if (!bvh.is_inside(p)) continue;
-      double outer = size;
-      for (const InnerSphere& sphere : packing.spheres) {
-        outer = std::min(outer, (p - sphere.center).norm() - sphere.cover_radius);
-      }
-      ASSERT_LE(outer, gap + 1e-9 * size) << p.transpose();
+      ASSERT_LE(distance_to(packing.spheres, &InnerSphere::cover_radius, p), gap + 1e-9 * size)
+          << p.transpose();
     }
   }
 }
@@ -172,9 +164,7 @@ TEST(PackMesh, InnerSpheresDoNotProtrudeThroughHoles) {
     int before_hole = 0;
     for (int i = 0; i < 20000; ++i) {
       const Eigen::Vector3d p = test::random_vector(&rng, 0.15);
-      double inner = 1e9;
-      for (const InnerSphere& b : packing.spheres)
-        inner = std::min(inner, (p - b.center).norm() - b.radius);
+      const double inner = distance_to(packing.spheres, &InnerSphere::radius, p);
       if (inner > 0.1) continue;
       const double distance = test::oracle_distance(mesh, p);
       if (inner >= distance) continue;

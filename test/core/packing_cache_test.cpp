@@ -3,11 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <set>
@@ -17,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/accuracy.h"
 #include "support/environment.h"
 #include "support/errors.h"
 #include "support/meshes.h"
@@ -51,11 +50,6 @@ void expect_equal(const Packing& a, const Packing& b) {
                            c.surface_area, c.reached);
   };
   EXPECT_EQ(numbers(a.certificate), numbers(b.certificate));
-}
-
-std::string content(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 class PackingCacheTest : public testing::Test {
@@ -144,7 +138,7 @@ TEST_F(PackingCacheTest, noDirectoryTurnsItOff) {
 
 TEST_F(PackingCacheTest, refusesEveryTruncation) {
   const fs::path file = store(sample_packing());
-  const std::string whole = content(file);
+  const std::string whole = test::read_text(file);
   for (std::size_t size = 0; size < whole.size(); ++size) {
     expect_refused(file, whole.substr(0, size), "not used");
   }
@@ -154,7 +148,7 @@ TEST_F(PackingCacheTest, refusesEveryTruncation) {
 
 TEST_F(PackingCacheTest, refusesEveryFlippedBit) {
   const fs::path file = store(sample_packing());
-  const std::string whole = content(file);
+  const std::string whole = test::read_text(file);
   for (std::size_t byte = 0; byte < whole.size(); ++byte) {
     std::string damaged = whole;
     damaged[byte] = static_cast<char>(damaged[byte] ^ (1 << (byte % 8)));
@@ -164,7 +158,7 @@ TEST_F(PackingCacheTest, refusesEveryFlippedBit) {
 
 TEST_F(PackingCacheTest, saysWhyAFileIsRefused) {
   const fs::path file = store(sample_packing());
-  const std::string whole = content(file);
+  const std::string whole = test::read_text(file);
   expect_refused(file, "", "too short");
   expect_refused(file, std::string(5000, 'x'), "no such file");
   std::string changed = whole;
@@ -206,7 +200,7 @@ TEST_F(PackingCacheTest, saysWhenTheDiskRefuses) {
   const PackingCache cache(in_the_way);
   EXPECT_FALSE(cache.store(kKey, sample_packing(), &warning_));
   test::expect_says(warning_, in_the_way);
-  EXPECT_EQ(content(in_the_way), "no folder");
+  EXPECT_EQ(test::read_text(in_the_way), "no folder");
 
   fs::create_directories(dir_.file("deep/cache/" + kKey + ".istpack/occupied"));
   warning_.clear();

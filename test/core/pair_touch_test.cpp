@@ -42,7 +42,6 @@ struct Pair {
   }
   SelfQuery make_query() const {
     QueryConfig config;
-    config.max_distance = 1.0;
     config.tolerance = 0.0;
     return {model, {{0, 1}}, config};
   }
@@ -218,12 +217,11 @@ TEST(PairTouch, AContactThroughAnOpeningHasADepthAndPointsOnTheLinks) {
 // A lid rests on the rim of a box without one, and a knob on its underside is half a millimetre
 // below the rim: it is in a slab of that width, and 50 mm from all walls.
 TEST(PairTouch, AKnobInAnOpeningIsAsDeepAsTheWallsAreFar) {
-  const auto at = [](double z) { return Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, z)); };
   Pair pair(test::open_box({0.1, 0.1, 0.1}),
-            test::joined(test::moved(test::box({0.2, 0.2, 0.02}), at(0.01)),
-                         test::moved(test::box({0.002, 0.002, 0.001}), at(0.0))));
+            test::joined(test::moved(test::box({0.2, 0.2, 0.02}), test::at(0.0, 0.0, 0.01)),
+                         test::box({0.002, 0.002, 0.001})));
   for (const double pressed : {0.0, 1e-9, 1e-6, 1e-4}) {
-    pair.X_FL[1] = at(0.05 - pressed);
+    pair.X_FL[1] = test::at(0.0, 0.0, 0.05 - pressed);
     const Eigen::Vector3d knob = pair.X_FL[1] * Eigen::Vector3d(0.0, 0.0, -0.0005);
     const double truth = test::oracle_signed_distance(pair.links[0], knob);
     ASSERT_LT(truth, -0.04);

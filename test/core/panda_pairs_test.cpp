@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 #include <set>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "internal/proximity/pair_samples_cache.h"
 #include "ist_proximity/proximity/self_query.h"
+#include "support/accuracy.h"
 #include "support/data_dir.h"
 #include "support/demo_arm.h"
 #include "support/sanitizers.h"
@@ -145,8 +145,7 @@ TEST_F(PairSamplesCacheTest, damagedFilesAreNotUsed) {
   std::string warning;
   PairSamplesCache(dir_.path().string())
       .store(key(), sample_pairs(model_, kinematics_, pairs_, sampling_), &warning);
-  std::ifstream in(file(), std::ios::binary);
-  const std::string good((std::istreambuf_iterator<char>(in)), {});
+  const std::string good = test::read_text(file());
   ASSERT_TRUE(is_used(good, &warning));
   for (std::size_t size = 0; size < good.size(); size += 7) {
     EXPECT_FALSE(is_used(good.substr(0, size), &warning)) << size;

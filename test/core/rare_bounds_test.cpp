@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <string>
 #include <variant>
 #include <vector>
 
@@ -39,7 +37,6 @@ TEST(RareBounds, AKeptBoundOfAFarPointLosesFloatsError) {
   test::Rng rng(161);
   const auto model = test::make_model({Sphere{0.1}}, 0.02);
   QueryConfig config;
-  config.max_distance = 1.0;
   config.tolerance = 0.0;
   for (int i = 0; i < test::scaled(500); ++i) {
     const Eigen::Vector3d direction = test::random_vector(&rng, 1.0).normalized();
@@ -85,7 +82,6 @@ TEST(RareBounds, ABoxThatMayBeInsideIsNotPrunedByTheSurface) {
     }
     if (!(std::abs(truth) > 1e-5)) continue;
     QueryConfig config;
-    config.max_distance = 1.0;
     config.tolerance = 0.0;
     ProximityQuery query(model, config);
     const LinkProximity answer = answer_of(&query, Eigen::Isometry3d::Identity(), cloud);
@@ -127,7 +123,6 @@ TEST(RareBounds, TheDeepestPointOfAPairMayBeInNoSphere) {
     if (!(margin > 1e-4)) continue;
     ++cases;
     QueryConfig config;
-    config.max_distance = 1.0;
     SelfQuery query(model, {{0, 1}}, config);
     std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
     X_FL[1].translation() = p;  // the centre, which is the deepest point of the sphere
@@ -174,7 +169,6 @@ TEST(RareBounds, WhatIsPrunedDepthFirstHasABound) {
     const double truth = first.distance(second, X_FL[1]);
     for (const double tolerance : {0.0003, 0.001, 0.002}) {
       QueryConfig config;
-      config.max_distance = 1.0;
       config.tolerance = tolerance;
       SelfQuery query(model, {{0, 1}}, config);
       std::vector<PairProximity> results;

@@ -62,8 +62,7 @@ TEST(SideBalls, TellNothingOfPlacesThatAreNotFinite) {
 // Many more places than the table has room for, of a mesh with holes.
 TEST(SideBalls, AgreeWithTheWindingNumber) {
   test::Rng rng(231);
-  const Solid solid(
-      {GeometryElement{test::open_box({0.15, 0.1, 0.2}), Eigen::Isometry3d::Identity(), ""}});
+  const Solid solid(test::one(test::open_box({0.15, 0.1, 0.2})));
   SideBalls balls(true);
   std::vector<Eigen::Vector3d> places;
   for (int i = 0; i < 400; ++i) places.push_back(test::random_vector(&rng, 0.11));
