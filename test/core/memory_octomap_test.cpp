@@ -6,7 +6,6 @@
 #include <cmath>
 #include <random>
 #include <string>
-#include <vector>
 
 #include "cloud/memory/voxel_ray.h"
 #include "ist_proximity/cloud/memory_map.h"
@@ -106,7 +105,6 @@ TEST(MemoryOctomap, RandomCloudsLeaveTheSameVoxels) {
   EXPECT_EQ(d.different, 0U) << "of " << d.compared << " voxels";
   EXPECT_GT(d.occupied, 100000U);
   EXPECT_GT(d.free, 100000U);
-  RecordProperty("voxels", std::to_string(d.compared));
 }
 
 TEST(MemoryOctomap, FilesAreReadByEachOther) {

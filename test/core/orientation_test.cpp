@@ -7,7 +7,6 @@
 
 #include "geometry/orientation.h"
 #include "internal/geometry/hole_caps.h"
-#include "internal/geometry/triangle_bvh.h"
 #include "support/hostile_meshes.h"
 #include "support/meshes.h"
 

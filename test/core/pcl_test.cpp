@@ -15,7 +15,6 @@
 
 #include "ist_proximity/facade/robot.h"
 #include "support/allocations.h"
-#include "support/demo_arm.h"
 #include "support/errors.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"

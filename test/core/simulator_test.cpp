@@ -9,6 +9,7 @@
 #include "scene.h"
 #include "support/demo_arm.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
 #include "support/scene.h"
 #include "support/shape_oracle.h"
 
@@ -46,7 +47,7 @@ TEST(RayShape, MeetsTheSurfaceAndNothingBefore) {
   test::Rng rng(1);
   for (const Shape& shape : std::vector<Shape>{Box{{0.3, 0.2, 0.5}}, Cylinder{0.15, 0.4},
                                                Sphere{0.25}, Shape(test::icosphere(0.3, 2))}) {
-    check_hit(shape, Solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}}), &rng);
+    check_hit(shape, Solid(test::one(shape)), &rng);
   }
 }
 
@@ -80,9 +81,9 @@ TEST(Simulation, PointsLieOnTheRobotOrAnObstacle) {
         to_robot = std::min(to_robot, d);
       }
       for (const Obstacle& obstacle : world.obstacles()) {
-        const GeometryElement element{obstacle.shape, Eigen::Isometry3d::Identity(), "test"};
         const Eigen::Vector3d p_O = obstacle.pose(picture.stamp).inverse() * p_F;
-        to_others = std::min(to_others, test::oracle_signed_distance({element}, p_O));
+        to_others =
+            std::min(to_others, test::oracle_signed_distance(test::one(obstacle.shape), p_O));
       }
       EXPECT_NEAR(std::min(to_robot, to_others), 0.0, 1e-5);
       (to_robot < to_others ? on_robot : on_others) += 1;

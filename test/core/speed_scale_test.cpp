@@ -145,9 +145,6 @@ TEST_F(OneLink, NoChatterUnder5mmNoise) {
     }
   }
   EXPECT_LE(starts, 5) << "of " << cycles << " cycles";
-  RecordProperty("cycles", cycles);
-  RecordProperty("starts", starts);
-  RecordProperty("starts_without_hysteresis", starts_without);
   EXPECT_GT(starts_without, 500);
   EXPECT_LT(wobble / cycles, 2e-4);
   EXPECT_GT(wobble_without / cycles, 0.015);

@@ -12,7 +12,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <numeric>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -20,7 +19,6 @@
 #include "cloud/thinning/voxel_kernel.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/repulsion/repulsion.h"
-#include "support/instruction_sets.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
@@ -47,7 +45,7 @@ RawCloud message_of(const Points& points_S, std::size_t width) {
 
 CloudSnapshot snapshot_of(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
                           double thinning = 0.01) {
-  IngestConfig config = test::whole_cloud(true);
+  IngestConfig config = test::whole_cloud();
   config.thinning = thinning;
   CloudSnapshot snapshot;
   Ingest(config).run(cloud, X_FS, {}, 0.0, &snapshot);

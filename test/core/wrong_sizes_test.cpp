@@ -13,7 +13,6 @@
 #include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/kinematics.h"
-#include "support/meshes.h"
 #include "support/scene.h"
 
 namespace ist {
