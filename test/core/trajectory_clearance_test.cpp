@@ -257,34 +257,6 @@ TEST(TrajectoryClearance, neverLateAndHardlyEarly) {
   EXPECT_GT(free, trajectories / 10);
 }
 
-// Points that come straight towards a link that stands reach it when the bound says so.
-TEST(TrajectoryClearance, obstaclesThatComeNearer) {
-  test::Rng rng(7);
-  const test::Arm arm = test::random_arm(&rng);
-  Scene scene = random_scene(&rng, arm);
-  for (std::size_t k = 1; k < scene.path.times.size(); ++k) {
-    scene.path.positions[k] = scene.path.positions[0];
-  }
-  scene.path.velocities.clear();
-  scene.path.accelerations.clear();
-  QueryConfig config;
-  config.max_distance = 3.0;
-  TimeOfImpact impacts(arm.model, arm.kinematics, config);
-  const double from = scene.path.times[0];
-  scene.motion.points = {Eigen::Vector3d(2.0, 0.3, 0.1)};
-  const double distance = test::sampled_distance(arm, scene.at(from), 0.5);
-  ASSERT_GT(distance, 0.1);
-  scene.path.times = {from, from + 100.0};
-  scene.path.positions.resize(2);
-  const CloudSnapshot cloud = test::make_snapshot(scene.motion.points);
-  const double speed = 0.5, age = 0.1;
-  const double first = clearance_of(&impacts, straight_pieces(scene.path), scene,
-                                    {from, speed, age}, cloud, arm.size())
-                           .contact_time;
-  EXPECT_NEAR(first, from + distance / speed - age, 0.01);
-  EXPECT_LE(first, from + distance / speed - age);
-}
-
 // One piece, whose chord stands still: all of the motion is deviation, of the joint that follows
 // too.
 TEST(TrajectoryClearance, jointsThatFollowLeaveTheChord) {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <memory>
 #include <random>
 #include <set>
 #include <vector>
@@ -296,27 +295,6 @@ TEST_F(ViewFilter, singlePixelsOfNoiseAreTheRobots) {
           << c.pixels.size() << " pixels at " << c.height << " m, " << c.others.size()
           << " others at " << c.height_of_others << " m";
     }
-  }
-}
-
-// What the padding keeps, the view keeps; of what the padding drops, the view drops the robot.
-TEST_F(ViewFilter, dropsNothingThatThePaddingKeeps) {
-  const std::vector<Body> others = {Body(Box{{0.1, 0.1, 0.1}}, at(0.0, 0.15, 0.95))};
-  image = picture(robot, others, 1);
-  // Noise of 0.1 mm as stated is far too little, so that nearly everything is in doubt.
-  for (const double stated : {1e-4, kNoise}) {
-    IngestConfig config = config_of(SelfFilterMode::kView);
-    config.view.noise = {stated, 0.0};
-    Ingest doubting(config), padding(config_of(SelfFilterMode::kPadding));
-    take_in(image.raw(), 0.0, &doubting, &viewed);
-    take_in(image.raw(), 0.0, &padding, &padded, viewed.view.X_SC);
-    const std::set<std::uint32_t> kept = test::ids_of(viewed.index);
-    int lost = 0;
-    for (const std::uint32_t id : test::ids_of(padded.index)) lost += kept.count(id) == 0 ? 1 : 0;
-    EXPECT_LE(lost, 3) << "the correction reported is newer than the one used, by micrometres";
-    EXPECT_EQ(viewed.counts.received, viewed.counts.used + viewed.counts.on_robot +
-                                          viewed.counts.out_of_range + viewed.counts.not_a_number);
-    EXPECT_EQ(viewed.counts.used, kept.size());
   }
 }
 

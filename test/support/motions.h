@@ -29,8 +29,7 @@ struct ArmMotion {
 
 /// Shapes of links, packed.
 struct LinkShapes {
-  explicit LinkShapes(const std::vector<Shape>& all)
-      : shapes(all), packed(make_model(all, 0.01)) {}
+  explicit LinkShapes(const std::vector<Shape>& all) : shapes(all), packed(make_model(all, 0.01)) {}
 
   std::vector<Shape> shapes;
   std::shared_ptr<const RobotModel> packed;
