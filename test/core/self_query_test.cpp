@@ -111,9 +111,7 @@ TEST(SelfQuery, aLinkInsideAnotherIsInContact) {
 
 TEST(SelfQuery, unknownPosesAndMargin) {
   const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}, Sphere{0.1}}, kMaxError);
-  std::vector<Eigen::Isometry3d> X_FL(3, Eigen::Isometry3d::Identity());
-  X_FL[1].translation().x() = 0.3;
-  X_FL[2].translation().x() = 5.0;
+  std::vector<Eigen::Isometry3d> X_FL = {test::at(0, 0, 0), test::at(0.3, 0, 0), test::at(5, 0, 0)};
   QueryConfig with_margin = config();
   with_margin.margin = 0.02;
   SelfQuery query(model, {{0, 1}, {1, 2}}, with_margin);
@@ -150,24 +148,13 @@ TEST(SelfQuery, CoarsePackingsAreNoLargerThanTheirLinks) {
   test::Rng rng(13);
   const Eigen::Vector3d small(0.2, 0.15, 0.1), large(2.0, 2.0, 0.2);
   const auto model = test::make_model({test::box(small), test::box(large)}, 0.02);
-  QueryConfig config;
-  config.max_distance = 1.0;
-  for (const bool swapped : {false, true}) {
-    const LinkPair pair = swapped ? LinkPair{1, 0} : LinkPair{0, 1};
-    SelfQuery query(model, {pair}, config);
+  for (const LinkPair pair : {LinkPair{0, 1}, LinkPair{1, 0}}) {
+    SelfQuery query(model, {pair}, {});
     std::vector<PairProximity> results;
     for (int i = 0; i < test::scaled(500); ++i) {
-      std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
-      X_FL[0] = test::random_pose(&rng, 0.2);
-      double lowest = std::numeric_limits<double>::infinity();
-      for (const double x : {-0.5, 0.5}) {
-        for (const double y : {-0.5, 0.5}) {
-          for (const double z : {-0.5, 0.5}) {
-            const Eigen::Vector3d corner(x * small.x(), y * small.y(), z * small.z());
-            lowest = std::min(lowest, (X_FL[0].linear() * corner).z());
-          }
-        }
-      }
+      std::vector<Eigen::Isometry3d> X_FL = {test::random_pose(&rng, 0.2), test::at(0, 0, 0)};
+      const double lowest = test::bounds(test::moved(test::box(small), X_FL[0])).min().z() -
+                            X_FL[0].translation().z();
       const double truth = test::uniform(&rng, 0.001, 0.3);
       X_FL[0].translation().z() = 0.5 * large.z() + truth - lowest;
       query.run(X_FL, {true, true}, &results);
