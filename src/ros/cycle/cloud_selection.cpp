@@ -93,8 +93,7 @@ const SourceSnapshot* CloudSelection::newest(const CloudSources& sources, std::s
   return held_.back().get();
 }
 
-ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer) const {
-  const int source = source_of(answer);
+ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer, int source) const {
   if (source < 0) return {};
   // The points in zones are of the same measurement.
   const CloudSnapshot& whole = selected_[static_cast<std::size_t>(source)]->cloud;
@@ -102,9 +101,10 @@ ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer) const
           cloud_stands_still_[static_cast<std::size_t>(answer.source)]};
 }
 
-int CloudSelection::source_of(const LinkProximity& answer) const {
-  const auto cloud = static_cast<std::size_t>(answer.source);
-  return answer.source < 0 || cloud >= clouds_.size() ? -1 : cloud_sources_[cloud];
+int CloudSelection::source_of(const LinkProximity& answer, bool is_world) const {
+  const std::vector<int>& sources = is_world ? world_sources_ : cloud_sources_;
+  const auto number = static_cast<std::size_t>(answer.source);
+  return answer.source < 0 || number >= sources.size() ? -1 : sources[number];
 }
 
 void CloudSelection::list_zones(std::vector<std::string>* names) const {

@@ -43,18 +43,18 @@ class CloudSelection {
   Span<const PosedWorld* const> worlds() const { return worlds_; }
   /// The surfaces of the robot's links; null where there is no world.
   const std::shared_ptr<const RobotSurfaces>& surfaces() const { return surfaces_; }
-  /// By world: the number of its source.
-  const std::vector<int>& world_sources() const { return world_sources_; }
   /// By source: its snapshot where that is selected, else null.
   const std::vector<const SourceSnapshot*>& selected() const { return selected_; }
   /// The stamp of the oldest selected cloud, map files aside; zero when there is none.
   ros::Time oldest_stamp() const { return oldest_stamp_; }
   /// By cloud: the number of its source; the clouds of a source follow each other.
   const std::vector<int>& cloud_sources() const { return cloud_sources_; }
-  /// The selected cloud that holds the nearest point of an answer.
-  ClosingSpeed::Nearest nearest(const LinkProximity& answer) const;
-  /// The number of that cloud's source; -1: no point is near.
-  int source_of(const LinkProximity& answer) const;
+  /// The number of the source of the nearest point of an answer; -1: no point is near.
+  /// @param is_world  whether that point is an object's
+  int source_of(const LinkProximity& answer, bool is_world) const;
+  /// The selected cloud that holds that point, where it is no object's.
+  /// @param source  the number of its source
+  ClosingSpeed::Nearest nearest(const LinkProximity& answer, int source) const;
   /// The zones that have left points out of the selected clouds, each once.
   void list_zones(std::vector<std::string>* names) const;
   /// Makes links false whose own points the self-filter left in a selected cloud: they would be

@@ -80,7 +80,8 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   find_urgent_links();
   compute_pushes(config, end_of(deadline_, kRepulsionShare, begin));
   message->repulsion_time = watch.lap();
-  compute_wrenches(config, end_of(deadline_, 1.0, begin));
+  const TimePoint end = end_of(deadline_, 1.0, begin);
+  for (const std::size_t i : urgent_) wrenches_[i] = penetration(i, config, end);
   message->penetration_time = watch.lap();
 
   message->header.stamp = poses_.stamp;
@@ -267,10 +268,6 @@ void ProximityCycle::compute_pushes(const LiveConfig& config, TimePoint end) {
   }
 }
 
-void ProximityCycle::compute_wrenches(const LiveConfig& config, TimePoint end) {
-  for (const std::size_t i : urgent_) wrenches_[i] = penetration(i, config, end);
-}
-
 void ProximityCycle::look_up_poses(const ros::Time& now) {
   if (pose_source_) {
     pose_source_->look_up(now, &poses_);
@@ -309,10 +306,11 @@ void ProximityCycle::fill_links(ProximityArray* message) {
     const std::size_t i = model_->monitored[k];
     const LinkProximity& result = results_[i];
     const bool is_world = worlds_.any() && worlds_.is_nearest(i);
-    const int source = is_world ? worlds_.source_of(result) : selection_.source_of(result);
+    const int source = selection_.source_of(result, is_world);
     assign_link(robot_.links[i].name, result, pushes_[i], wrenches_[i],
                 speeds_[i].update(message->header.stamp.toSec(), result, poses_.X_FL[i],
-                                  is_world ? worlds_.nearest(result) : selection_.nearest(result)),
+                                  is_world ? worlds_.nearest(result, source)
+                                           : selection_.nearest(result, source)),
                 source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
                 &message->links[k]);
     assign_box(boxes_[i].box_L, &message->links[k]);

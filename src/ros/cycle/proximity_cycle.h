@@ -128,7 +128,6 @@ class ProximityCycle {
   void run_add_ons(const LiveConfig& config);
   void find_urgent_links();
   void compute_pushes(const LiveConfig& config, TimePoint end);
-  void compute_wrenches(const LiveConfig& config, TimePoint end);
   Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
   void add_self_repulsion(const ist_proximity::ProximityArray* self);
   void fill_links(ist_proximity::ProximityArray* message);

@@ -16,7 +16,6 @@ bool is_near(const LinkProximity& answer) {
 
 void WorldAnswers::note_motion(const CloudSelection& selection, double time) {
   const Span<const PosedWorld* const> worlds = selection.worlds();
-  sources_.assign(selection.world_sources().begin(), selection.world_sources().end());
   motions_.resize(worlds.size());
   for (std::size_t w = 0; w < worlds.size(); ++w) {
     Motion& motion = motions_[w];
@@ -79,13 +78,7 @@ void WorldAnswers::combine(SnapshotSpan clouds, std::vector<LinkProximity>* resu
   }
 }
 
-int WorldAnswers::source_of(const LinkProximity& answer) const {
-  const auto world = static_cast<std::size_t>(answer.source);
-  return answer.source < 0 || world >= sources_.size() ? -1 : sources_[world];
-}
-
-ClosingSpeed::Nearest WorldAnswers::nearest(const LinkProximity& answer) const {
-  const int source = source_of(answer);
+ClosingSpeed::Nearest WorldAnswers::nearest(const LinkProximity& answer, int source) const {
   if (source < 0) return {};
   const Motion& motion = motions_[static_cast<std::size_t>(answer.source)];
   return {source, motion.key, time_, time_ - motion.moved > kStandsStill};

@@ -52,9 +52,9 @@ class WorldAnswers {
   /// Another one whenever the objects are others, but not when they move with their frames; 0
   /// without a world.
   std::uint64_t key() const { return any_ ? key_ : 0; }
-  /// For a link whose nearest point is an object's: the number of its source, and its motion.
-  int source_of(const LinkProximity& answer) const;
-  ClosingSpeed::Nearest nearest(const LinkProximity& answer) const;
+  /// The motion of the world that holds the nearest point of an answer, where that is an object's.
+  /// @param source  the number of its source
+  ClosingSpeed::Nearest nearest(const LinkProximity& answer, int source) const;
 
  private:
   /// The motion of a world's frames.
@@ -69,7 +69,6 @@ class WorldAnswers {
   std::unique_ptr<WorldQuery> query_;  ///< null before the first world
   std::vector<LinkProximity> answers_;
   std::vector<bool> is_nearest_;
-  std::vector<int> sources_;     ///< by world
   std::vector<Motion> motions_;  ///< by world
   double time_ = 0.0;            ///< [s] of the last run()
   std::uint64_t key_ = 0;
