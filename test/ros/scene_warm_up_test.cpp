@@ -91,6 +91,28 @@ TEST_F(SceneWarmUpTest, ExchangesForTheCloudsThatItIsWarmFor) {
   EXPECT_NEAR(results[0].distance, 0.75, 0.002);
 }
 
+// A map's cloud is the reader's own copy.
+class PlacedSource : public test::StatedSource {
+ public:
+  using test::StatedSource::StatedSource;
+  std::shared_ptr<const SourceSnapshot> share(const SnapshotRequest& request) override {
+    return std::make_shared<const SourceSnapshot>(*test::StatedSource::share(request));
+  }
+};
+
+TEST_F(SceneWarmUpTest, KeyOfACloudThatIsPlacedForItIsThatOfTheCycle) {
+  auto map = std::make_unique<PlacedSource>("map");
+  *map->cloud(ros::Time(1.0)) = plane(1.0);
+  second_ = map.get();
+  sources_[1] = std::move(map);
+  warm_up_.begin(queries());
+  warm_up_.note(scene_);
+  SourceSnapshot fresh;
+  fresh.cloud = plane(0.9);
+  EXPECT_GT(warm_up_.run(*first_, fresh), 0.0);
+  EXPECT_TRUE(warm_up_.exchange(key(fresh.cloud), &own_));
+}
+
 TEST_F(SceneWarmUpTest, DoesNothingForASourceWithoutPart) {
   warm_up_.begin(queries());
   scene_.sources = {1};

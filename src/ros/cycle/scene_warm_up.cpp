@@ -15,7 +15,8 @@ constexpr double kLongest = 0.005;
 
 void SceneWarmUp::begin(std::unique_ptr<CoherentQueries> spare) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  spare_ = {std::move(spare), 0};
+  spare_ = std::move(spare);
+  spare_obstacles_ = 0;
   has_scene_ = false;
   ++generation_;
 }
@@ -29,9 +30,9 @@ void SceneWarmUp::note(const AskedScene& scene) {
 
 bool SceneWarmUp::exchange(std::uint64_t obstacles, std::unique_ptr<CoherentQueries>* own) {
   const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
-  if (!lock.owns_lock() || !spare_.queries || spare_.obstacles != obstacles) return false;
-  own->swap(spare_.queries);
-  spare_.obstacles = 0;
+  if (!lock.owns_lock() || !spare_ || spare_obstacles_ != obstacles) return false;
+  own->swap(spare_);
+  spare_obstacles_ = 0;
   return true;
 }
 
@@ -46,25 +47,23 @@ double SceneWarmUp::run(const ObstacleSource& source, const SourceSnapshot& fres
     scene_ = newest_;
   }
   if (!select_clouds(source, fresh)) return 0.0;
+  std::unique_ptr<CoherentQueries> queries;
   std::uint64_t generation = 0;
-  std::unique_ptr<CoherentQueries> queries = take_spare(&generation);
-  if (!queries) return 0.0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!has_scene_ || !spare_) return 0.0;
+    queries = std::move(spare_);
+    generation = generation_;
+  }
   queries->warm_up(scene_.X_FL, scene_.known, clouds_, scene_.query, scene_.repulsion, kLongest);
+  const std::uint64_t obstacles = obstacles_key(clouds_);
   held_.clear();
-  give_back(std::move(queries), generation);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (generation == generation_) {
+    spare_ = std::move(queries);
+    spare_obstacles_ = obstacles;
+  }
   return watch.lap();
-}
-
-std::unique_ptr<CoherentQueries> SceneWarmUp::take_spare(std::uint64_t* generation) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  *generation = generation_;
-  spare_.obstacles = 0;
-  return has_scene_ ? std::move(spare_.queries) : nullptr;
-}
-
-void SceneWarmUp::give_back(std::unique_ptr<CoherentQueries> queries, std::uint64_t generation) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (generation == generation_) spare_ = {std::move(queries), obstacles_key(clouds_)};
 }
 
 void SceneWarmUp::end() {

@@ -55,19 +55,13 @@ class SceneWarmUp {
   void end();
 
  private:
-  struct Spare {
-    std::unique_ptr<CoherentQueries> queries;
-    std::uint64_t obstacles = 0;  ///< key of the clouds that they are warm for; 0: none
-  };
-
-  std::unique_ptr<CoherentQueries> take_spare(std::uint64_t* generation);
-  void give_back(std::unique_ptr<CoherentQueries> queries, std::uint64_t generation);
   bool select_clouds(const ObstacleSource& source, const SourceSnapshot& fresh);
 
   const CloudSources& sources_;
 
   std::mutex mutex_;  ///< held for moves and copies only; guards the members below
-  Spare spare_;
+  std::unique_ptr<CoherentQueries> spare_;
+  std::uint64_t spare_obstacles_ = 0;  ///< key of the clouds that it is warm for; 0: none
   AskedScene newest_;
   std::uint64_t generation_ = 0;  ///< counts begin()
   bool has_scene_ = false, has_ended_ = false;
