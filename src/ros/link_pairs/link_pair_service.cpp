@@ -39,17 +39,15 @@ std::string text_of(const std::vector<SampledPair>& sampled, std::size_t configu
 
 }  // namespace
 
-LinkPairService::LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config,
-                                 const ModelLoader& loader)
-    : config_(config), loader_(loader) {
-  service_ = private_nh.advertiseService("link_pairs", &LinkPairService::answer, this);
+LinkPairService::LinkPairService(const AddOnContext& node) : node_(node) {
+  service_ = node_.private_nh.advertiseService("link_pairs", &LinkPairService::answer, this);
   thread_.start(
       "ist sampling", [this] { sample_newest(); }, true);
 }
 
 void LinkPairService::sample_newest() {
   if (model_ && !is_outdated(*model_)) return;
-  model_ = loader_.state();
+  model_ = node_.loader.state();
   const auto model = model_;
   if (!model->is_ready() || !model->kinematics) return;
   Findings findings;
@@ -66,7 +64,7 @@ void LinkPairService::sample_newest() {
 
 /// Finer packings change nothing here.
 bool LinkPairService::is_outdated(const ModelState& model) const {
-  const auto newest = loader_.state();
+  const auto newest = node_.loader.state();
   return !thread_.is_running() || (newest.get() != &model && !is_refinement(model, *newest));
 }
 
@@ -84,7 +82,7 @@ void LinkPairService::sample(Findings* findings) {
         chosen.reason != PairReason::kAdjacent && chosen.reason != PairReason::kUnusable;
     if (is_sampled) pairs.push_back(chosen.pair);
   }
-  const PairSamplesCache cache(config_.model.cache_directory);
+  const PairSamplesCache cache(node_.config.model.cache_directory);
   const std::string key =
       pair_samples_key(*model.description, *model.robot, *model.kinematics, pairs, sampling);
   std::string warning;
@@ -128,7 +126,7 @@ std::string LinkPairService::left_out_though_apart(const Findings& findings) {
 bool LinkPairService::answer(Service::Request& request, Service::Response& response) {
   const std::shared_ptr<const Findings> findings = std::atomic_load(&findings_);
   if (!findings || is_outdated(*findings->model)) {
-    const auto model = loader_.state();
+    const auto model = node_.loader.state();
     response.message = !model->is_ready()  ? model->problem
                        : model->kinematics ? "the pairs are being chosen"
                                            : no_kinematics(*model);

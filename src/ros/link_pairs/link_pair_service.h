@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "ist_proximity/proximity/self_query.h"
+#include "ros/add_ons/add_on.h"
 #include "ros/common/callback_thread.h"
-#include "ros/model/model_loader.h"
-#include "ros/parameters/parameters.h"
 #include "ros/services/pair_choice.h"
 
 namespace ist {
@@ -20,9 +19,7 @@ namespace ist {
 /// the cache. Sampling informs; it leaves no pair out.
 class LinkPairService {
  public:
-  /// @param loader  outlives this
-  LinkPairService(ros::NodeHandle private_nh, const ServerConfig& config,
-                  const ModelLoader& loader);
+  explicit LinkPairService(const AddOnContext& node);
 
  private:
   using Service = ist_proximity::ListLinkPairs;
@@ -41,8 +38,7 @@ class LinkPairService {
   bool is_outdated(const ModelState& model) const;
   bool answer(Service::Request& request, Service::Response& response);
 
-  const ServerConfig config_;
-  const ModelLoader& loader_;
+  AddOnContext node_;
   std::shared_ptr<const ModelState> model_;  ///< of the last sampling; the thread's own
   /// Null before the first model; loaded and stored atomically.
   std::shared_ptr<const Findings> findings_;

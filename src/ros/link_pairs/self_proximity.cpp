@@ -22,11 +22,13 @@ using ist_proximity::ProximityArray;
 using ist_proximity::ProximityArrayConstPtr;
 using Clock = std::chrono::steady_clock;
 
-SelfProximity::SelfProximity(ros::NodeHandle private_nh, const ServerConfig& config,
-                             const ModelLoader& loader, const TransformBuffer& buffer,
-                             JointStateListener* joints, std::function<LiveConfig()> live)
-    : config_(config), loader_(loader), buffer_(buffer), joints_(joints), live_(std::move(live)) {
-  publisher_ = private_nh.advertise<ProximityArray>("self_proximity", 10);
+std::unique_ptr<AddOn> make_link_pairs(const AddOnContext& node) {
+  if (!node.config.self_collision.enabled) return nullptr;
+  return std::make_unique<SelfProximity>(node);
+}
+
+SelfProximity::SelfProximity(const AddOnContext& node) : node_(node) {
+  publisher_ = node_.private_nh.advertise<ProximityArray>("self_proximity", 10);
   thread_ = std::thread(&SelfProximity::run, this);
 }
 
@@ -35,7 +37,7 @@ SelfProximity::~SelfProximity() {
   thread_.join();
 }
 
-ProximityArrayConstPtr SelfProximity::newest(const ModelState& model) const {
+ProximityArrayConstPtr SelfProximity::self_proximity(const ModelState& model) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool is_of_model =
       newest_model_ && (newest_model_.get() == &model || is_refinement(*newest_model_, model));
@@ -63,44 +65,43 @@ void SelfProximity::run() {
       take_model();
       publish_once();
     });
-    if (!fault.empty()) publish_failure(fault);
+    if (fault.empty()) continue;
+    ROS_ERROR_STREAM_THROTTLE(
+        5.0, "link against link: a cycle failed, and all links are UNKNOWN: " << fault);
+    // There may be no memory even for that.
+    exception_of([&] { publish_unknown("the last cycle failed: " + fault); });
   }
 }
 
-/// Says that an exception has ended a cycle, and that nothing is known. The next one is run as
-/// usual.
-void SelfProximity::publish_failure(const std::string& fault) {
-  ROS_ERROR_STREAM_THROTTLE(
-      5.0, "link against link: a cycle failed, and all links are UNKNOWN: " << fault);
-  exception_of([&] {  // there may be no memory even for that
-    const auto message = boost::make_shared<ProximityArray>();
-    message->header.stamp = ros::Time::now();
-    message->status = ProximityArray::MODEL_ERROR;
-    message->status_text = "the last cycle failed: " + fault;
-    if (model_) {
-      message->header.frame_id = fixed_frame_of(*model_, config_);
-      for (const std::string& link : model_->links) message->links.push_back(unknown_link(link));
-    }
-    publish(message);
-  });
+/// Says why nothing is known; empty: the model has no fault.
+void SelfProximity::publish_unknown(const std::string& problem) {
+  const auto message = boost::make_shared<ProximityArray>();
+  ModelState model = model_ ? *model_ : ModelState();
+  model.problem = problem;
+  CycleReport report;  // nobody reads it
+  fill_without_model(model, node_.config, std::max(ros::Time::now(), last_stamp_), {},
+                     message.get(), &report);
+  last_stamp_ = message->header.stamp;
+  publish(message);
 }
 
 void SelfProximity::take_model() {
-  const auto newest = loader_.state();
+  const auto newest = node_.loader.state();
   if (newest == loaded_) return;
   const bool is_refined = query_ && is_refinement(*loaded_, *newest);
   model_ = with_paired(newest);
   loaded_ = newest;
   if (is_refined) {
-    query_ =
-        std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query, is_stopped_);
+    query_ = std::make_unique<SelfQuery>(model_->robot, query_->pairs(), node_.config.query,
+                                         is_stopped_);
     return;
   }
   query_.reset();
   if (!model_->is_ready() || !model_->kinematics) return;  // pairs need all links
-  query_ = std::make_unique<SelfQuery>(model_->robot, watched_pairs(), config_.query, is_stopped_);
-  pose_source_ =
-      make_pose_source(*model_, config_, buffer_, joints_, JointStateListener::Which::kNewest);
+  query_ =
+      std::make_unique<SelfQuery>(model_->robot, watched_pairs(), node_.config.query, is_stopped_);
+  pose_source_ = make_pose_source(*model_, node_.config, node_.buffer, node_.joints,
+                                  JointStateListener::Which::kNewest);
   speeds_.assign(model_->robot->links.size(), ClosingSpeed());
   boxes_ = link_boxes(*model_->robot);
   late_joints_.emplace(model_->kinematics, boxes_);
@@ -118,7 +119,7 @@ LinkProximity SelfProximity::nearest(std::size_t link, std::size_t* other) const
   if (!poses_.known[link]) return answer;
   answer.state = LinkState::kClear;
   answer.distance = std::numeric_limits<double>::infinity();
-  answer.lower_bound = config_.query.max_distance;
+  answer.lower_bound = node_.config.query.max_distance;
   answer.margin = margin_;
   for (std::size_t i = 0; i < results_.size(); ++i) {
     const LinkPair& pair = query_->pairs()[i];
@@ -217,40 +218,34 @@ void SelfProximity::publish_once() {
     last_stamp_ = poses_.stamp = ros::Time();
   }
   last_now_ = now;
+  if (!query_) {
+    const bool is_faulty = model_->problem.empty() && !model_->kinematics;
+    return publish_unknown(is_faulty ? no_kinematics(*model_) : model_->problem);
+  }
   const auto message = boost::make_shared<ProximityArray>();
-  LiveConfig live = live_();
+  LiveConfig live = node_.live();
   live.query.deadline = deadline_of(live.query.deadline, 1.0 / SelfCollisionConfig::kRate);
   StatusInput input;
   input.clock_runs = !now.isZero();
   input.findings = model_findings(*model_);
-  if (model_->problem.empty() && !model_->kinematics) {
-    note(Rank::kModel, "model", no_kinematics(*model_), &input.findings);
+  poses_.stamp = last_stamp_;
+  pose_source_->look_up(now, &poses_);
+  const auto begin = Clock::now();
+  measure(live);
+  for (const std::size_t i : model_->monitored) input.deadline.unfinished += is_finished(i) ? 0 : 1;
+  message->unfinished = static_cast<std::uint32_t>(input.deadline.unfinished);
+  compute_wrenches(live, end_of(live.query.deadline, 1.0, begin), &input.deadline);
+  message->header.frame_id = fixed_frame_of(*model_, node_.config);
+  message->header.stamp = last_stamp_ = poses_.stamp;
+  const RobotModel& robot = *model_->robot;
+  note(Rank::kPose, "pose", missing_poses(robot, model_->monitored, poses_, pose_source_.get()),
+       &input.findings);
+  for (const std::size_t i : model_->monitored) add_link(i, live.repulsion, message.get());
+  for (std::size_t i = 0; i < results_.size(); ++i) {
+    message->pairs.push_back(pair_message(robot, query_->pairs()[i], results_[i]));
   }
-  message->header.frame_id = fixed_frame_of(*model_, config_);
-  message->header.stamp = std::max(now, last_stamp_);
-  if (query_) {
-    poses_.stamp = last_stamp_;
-    pose_source_->look_up(now, &poses_);
-    const auto begin = Clock::now();
-    measure(live);
-    for (const std::size_t i : model_->monitored)
-      input.deadline.unfinished += is_finished(i) ? 0 : 1;
-    message->unfinished = static_cast<std::uint32_t>(input.deadline.unfinished);
-    compute_wrenches(live, end_of(live.query.deadline, 1.0, begin), &input.deadline);
-    message->header.stamp = poses_.stamp;
-    const RobotModel& robot = *model_->robot;
-    note(Rank::kPose, "pose", missing_poses(robot, model_->monitored, poses_, pose_source_.get()),
-         &input.findings);
-    for (const std::size_t i : model_->monitored) add_link(i, live.repulsion, message.get());
-    for (std::size_t i = 0; i < results_.size(); ++i) {
-      message->pairs.push_back(pair_message(robot, query_->pairs()[i], results_[i]));
-    }
-    const std::chrono::duration<double> took = Clock::now() - begin;
-    message->computation_time = took.count();
-  } else {
-    for (const std::string& link : model_->links) message->links.push_back(unknown_link(link));
-  }
-  last_stamp_ = message->header.stamp;
+  const std::chrono::duration<double> took = Clock::now() - begin;
+  message->computation_time = took.count();
   note(Rank::kDegraded, "pose", poses_.doubts, &input.findings);
   const Status status = decide(find_all(input, now.toSec()), input.clock_runs);
   message->status = status.code;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist_proximity/ProximityArray.h>
-#include <ros/node_handle.h>
 #include <ros/publisher.h>
 
 #include <functional>
@@ -15,39 +14,30 @@
 #include "ist_proximity/control/constraint_rows.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/self_query.h"
+#include "ros/add_ons/add_on.h"
 #include "ros/common/stop_signal.h"
 #include "ros/cycle/late_joints.h"
-#include "ros/model/model_loader.h"
-#include "ros/parameters/parameters.h"
-#include "ros/poses/joint_state_listener.h"
+#include "ros/link_pairs/link_pair_service.h"
 #include "ros/poses/pose_source.h"
-#include "ros/poses/transform_buffer.h"
 #include "ros/status/status.h"
 
 namespace ist {
 
 /// Measures link against link: publishes ~self_proximity at 50 Hz of the wall clock, from a thread
-/// of its own. Pairs are left out when one joint or fixed joints alone connect them, when the SRDF
-/// disables them (CollisionRules), and when they are in contact at rest. Its links are the
-/// monitored ones, and then the paired ones.
-class SelfProximity {
+/// of its own, and has ~link_pairs. Pairs are left out when one joint or fixed joints alone connect
+/// them, when the SRDF disables them (CollisionRules), and when they are in contact at rest. Its
+/// links are the monitored ones, and then the paired ones.
+class SelfProximity : public AddOn {
  public:
-  /// @param loader, buffer  outlive this
-  /// @param joints   outlives this; null: link poses come from the buffer
-  /// @param live     gives the present configuration; called from the thread
-  SelfProximity(ros::NodeHandle private_nh, const ServerConfig& config, const ModelLoader& loader,
-                const TransformBuffer& buffer, JointStateListener* joints,
-                std::function<LiveConfig()> live);
-  ~SelfProximity();
+  explicit SelfProximity(const AddOnContext& node);
+  ~SelfProximity() override;
 
-  /// The message that was published last; null where it is of another model, or before the first.
-  /// Thread safe.
-  ist_proximity::ProximityArrayConstPtr newest(const ModelState& model) const;
+  ist_proximity::ProximityArrayConstPtr self_proximity(const ModelState& model) const override;
 
  private:
   void run();
   void publish_once();
-  void publish_failure(const std::string& fault);
+  void publish_unknown(const std::string& problem);
   void publish(const ist_proximity::ProximityArrayConstPtr& message);
   void take_model();
   std::vector<LinkPair> watched_pairs() const;
@@ -59,11 +49,8 @@ class SelfProximity {
   void compute_wrenches(const LiveConfig& live, TimePoint end, DeadlineCost* cost);
   Wrench penetration(std::size_t link, const LinkProximity& answer) const;
 
-  const ServerConfig config_;
-  const ModelLoader& loader_;
-  const TransformBuffer& buffer_;
-  JointStateListener* const joints_;
-  const std::function<LiveConfig()> live_;
+  AddOnContext node_;
+  LinkPairService service_{node_};
   ros::Publisher publisher_;
 
   StopSignal stop_signal_;

@@ -8,7 +8,7 @@
 namespace ist {
 
 std::string StatedCycle::take_model() {
-  std::shared_ptr<const ModelState> model = loader_.state();
+  std::shared_ptr<const ModelState> model = node_.loader.state();
   if (!model->is_ready()) return model->problem;
   if (!model->kinematics) return no_kinematics(*model);
   if (model == model_) return "";
@@ -18,15 +18,15 @@ std::string StatedCycle::take_model() {
     cycle_->refine(model_);
     return "";
   }
-  auto poses = std::make_unique<StatedPoseSource>(model_->kinematics, buffer_,
-                                                  fixed_frame_of(*model_, config_),
-                                                  link_names(*model_->robot), config_.pose_timeout);
+  auto poses = std::make_unique<StatedPoseSource>(
+      model_->kinematics, node_.buffer, fixed_frame_of(*model_, node_.config),
+      link_names(*model_->robot), node_.config.pose_timeout);
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(
-      model_, config_, std::move(poses), CloudSelection::Reader::kOther,
-      make_cycles(add_ons_, *model_, CloudSelection::Reader::kOther));
+      model_, node_.config, std::move(poses), CloudSelection::Reader::kOther,
+      make_cycles(node_.add_ons, *model_, CloudSelection::Reader::kOther));
   reach_ = kinematic_reach(*model_->robot, *model_->kinematics);
-  impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
+  impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, node_.config.query);
   return "";
 }
 
@@ -35,7 +35,7 @@ std::string StatedCycle::run(const sensor_msgs::JointState& configuration, const
   std::string problem = poses_->state(configuration);
   if (!problem.empty()) return problem;
   cycle_->forget();  // the configurations are no motion, so there is no speed between them
-  cycle_->run(ros::Time::now(), sources_, live, "", result);
+  cycle_->run(ros::Time::now(), node_.sources, live, "", result);
   return "";
 }
 

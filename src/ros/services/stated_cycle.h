@@ -19,12 +19,7 @@ namespace ist {
 /// thread.
 class StatedCycle {
  public:
-  explicit StatedCycle(const AddOnContext& node)
-      : config_(node.config),
-        loader_(node.loader),
-        sources_(node.sources),
-        buffer_(node.buffer),
-        add_ons_(node.add_ons) {}
+  explicit StatedCycle(const AddOnContext& node) : node_(node) {}
 
   /// Takes the newest model.
   /// @returns empty, or why there is none
@@ -48,11 +43,7 @@ class StatedCycle {
   const ProximityCycle& cycle() const { return *cycle_; }
 
  private:
-  const ServerConfig config_;
-  const ModelLoader& loader_;
-  const CloudSources& sources_;
-  const TransformBuffer& buffer_;
-  const AddOns& add_ons_;
+  const AddOnContext node_;
 
   std::shared_ptr<const ModelState> model_;
   StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle

@@ -77,7 +77,7 @@ void TrajectoryWatch::fill_contact(std::size_t link, double contact, double now,
     message->text +=
         format_text("; braking is due in %.2f s", (message->brake - message->header.stamp).toSec());
   }
-  LiveConfig live = live_();
+  LiveConfig live = node_.live();
   live.query.deadline = 0.0;
   ist_proximity::ProximityArray there;
   const auto state = trajectory_.state(*model_->kinematics, contact);

@@ -29,24 +29,23 @@ ServerConfig with_fixed_links(ServerConfig config) {
 
 }  // namespace
 
+std::unique_ptr<AddOn> make_trajectory(const AddOnContext& node) {
+  return std::make_unique<TrajectoryWatch>(node);
+}
+
 TrajectoryWatch::TrajectoryWatch(const AddOnContext& node)
-    : nh_(node.nh),
-      private_nh_(node.private_nh),
-      config_(with_fixed_links(node.config)),
-      ignored_links_(node.ignored_links),
-      live_(node.live),
-      stated_(node) {
-  publisher_ = private_nh_.advertise<Message>("trajectory_clearance", 10);
-  markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("trajectory_markers", 1);
+    : node_(node), config_(with_fixed_links(node.config)), stated_(node) {
+  publisher_ = node_.private_nh.advertise<Message>("trajectory_clearance", 10);
+  markers_ = node_.private_nh.advertise<visualization_msgs::MarkerArray>("trajectory_markers", 1);
   if (!config_.trajectory.cancel_topic.empty()) {
-    cancel_ = nh_.advertise<actionlib_msgs::GoalID>(config_.trajectory.cancel_topic, 10);
+    cancel_ = node_.nh.advertise<actionlib_msgs::GoalID>(config_.trajectory.cancel_topic, 10);
   }
 }
 
 void TrajectoryWatch::subscribe(ros::CallbackQueue* queue) {
-  nh_.setCallbackQueue(queue);
-  private_nh_.setCallbackQueue(queue);
-  trajectories_ = private_nh_.subscribe("trajectory", 10, &TrajectoryWatch::receive, this);
+  node_.nh.setCallbackQueue(queue);
+  node_.private_nh.setCallbackQueue(queue);
+  trajectories_ = node_.private_nh.subscribe("trajectory", 10, &TrajectoryWatch::receive, this);
 }
 
 void TrajectoryWatch::receive(const Event& event) {
@@ -57,9 +56,9 @@ void TrajectoryWatch::receive(const Event& event) {
   if (states_) return timer_.start();
   // Whoever sends no trajectory pays for nothing.
   listening_since_ = Clock::now();
-  states_ = nh_.subscribe("joint_states", 100, &TrajectoryWatch::receive_state, this);
-  timer_ = private_nh_.createWallTimer(ros::WallDuration(kWakeUp),
-                                       [this](const ros::WallTimerEvent&) { run_when_due(); });
+  states_ = node_.nh.subscribe("joint_states", 100, &TrajectoryWatch::receive_state, this);
+  timer_ = node_.private_nh.createWallTimer(ros::WallDuration(kWakeUp),
+                                            [this](const ros::WallTimerEvent&) { run_when_due(); });
 }
 
 void TrajectoryWatch::receive_state(const sensor_msgs::JointStateConstPtr& message) {
@@ -157,7 +156,7 @@ void TrajectoryWatch::run_when_due() {
 void TrajectoryWatch::look(const ros::Time& now, Message* message) {
   const double time = std::max((now - trajectory_.start).toSec(), 0.0);
   Stopwatch watch;
-  LiveConfig live = live_();
+  LiveConfig live = node_.live();
   live.query.deadline = 0.0;
   std::string problem = why_elsewhere(time);
   if (problem.empty()) {
@@ -216,7 +215,7 @@ std::vector<bool> TrajectoryWatch::moved_links(const ros::Time& now) const {
                   [&](const CarriedWorlds::Frame& frame) { return is_moved(frame.body); });
   std::vector<bool> links(robot.links.size(), false);
   const std::vector<bool> counts =
-      counted_links(*model_, config_, ignored_links_(now), true).counts;
+      counted_links(*model_, config_, node_.ignored_links(now), true).counts;
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const std::size_t link = model_->monitored[i];
     const auto body = kinematics.find_body(robot.links[link].name);

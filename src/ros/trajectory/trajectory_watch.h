@@ -63,10 +63,8 @@ class TrajectoryWatch : public AddOn {
   void publish(Message* message, std::uint8_t state, const std::string& text);
   void cancel_when_due(const ros::Time& now);
 
-  ros::NodeHandle nh_, private_nh_;
+  AddOnContext node_;
   const ServerConfig config_;
-  const std::function<std::vector<std::string>(const ros::Time&)> ignored_links_;
-  const std::function<LiveConfig()> live_;
   StatedCycle stated_;
   ros::Publisher publisher_, markers_, cancel_;
   ros::Subscriber trajectories_, states_;
