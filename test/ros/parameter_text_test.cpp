@@ -50,9 +50,9 @@ struct YamlValue {
   std::string operator()(const Path& place) const { return *place.path; }
   std::string operator()(const Choice& choice) const { return choice.words.at(choice.current); }
   std::string operator()(const WordOr& either) const { return (*this)(either.word); }
-  std::string operator()(const Numbers& numbers) const {
+  std::string operator()(const Eigen::Vector3d* numbers) const {
     std::vector<std::string> texts;
-    for (std::size_t i = 0; i < numbers.count; ++i) texts.push_back(number_text(numbers.first[i]));
+    for (int i = 0; i < 3; ++i) texts.push_back(number_text((*numbers)[i]));
     return "[" + join(texts, ", ") + "]";
   }
   template <class List>  // all lists of names are empty

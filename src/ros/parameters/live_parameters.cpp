@@ -46,12 +46,6 @@ void add_number(const Parameter& row, double number, Config* config) {
   config->groups[0].state = true;
 }
 
-Config config_of(const std::vector<Parameter>& rows) {
-  Config config;
-  for (const Parameter& row : rows) add_number(row, row.number(), &config);
-  return config;
-}
-
 /// A value that is set is not cut off.
 ConfigDescription describe(const std::vector<Parameter>& defaults,
                            const std::vector<Parameter>& live, double max_distance) {
@@ -296,7 +290,8 @@ void LiveParameters::log(const std::string& text) {
 void LiveParameters::publish_updates() {
   ServerConfig live = config();
   for (Group& group : groups_) {
-    const Config now = config_of(rows_of(group.name, &live));
+    Config now;
+    for (const Parameter& row : rows_of(group.name, &live)) add_number(row, row.number(), &now);
     if (now == group.published) continue;
     group.published = now;
     publish_message(group.updates, now);

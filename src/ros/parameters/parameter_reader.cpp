@@ -101,6 +101,7 @@ struct Taker {
       (*this)(either.word);
     } else {
       std::visit(*this, either.other);
+      if (needed.empty()) either.note_other();
     }
   }
 
@@ -115,16 +116,16 @@ struct Taker {
     }
   }
 
-  void operator()(Numbers numbers) {
+  void operator()(Eigen::Vector3d* place) {
     std::vector<double> taken;
     take_list(
-        "a list of " + std::to_string(numbers.count) + " numbers is needed, each " + range.text(),
+        "a list of 3 numbers is needed, each " + range.text(),
         [&](const XmlRpcValue& element) {
           taken.push_back(number_in(element).value_or(std::nan("")));
           return range.contains(taken.back());
         },
-        static_cast<int>(numbers.count));
-    if (needed.empty()) std::copy(taken.begin(), taken.end(), numbers.first);
+        3);
+    if (needed.empty()) *place = Eigen::Vector3d(taken.data());
   }
 
   void operator()(std::vector<std::string>* place) {
@@ -164,22 +165,17 @@ struct Taker {
   }
 };
 
-void collect_leaves(const XmlRpcValue& value, const std::string& path,
-                    std::map<std::string, XmlRpcValue>* leaves) {
-  if (value.getType() != XmlRpcValue::TypeStruct) {
-    if (value.valid() && !path.empty()) leaves->emplace(path, value);
-    return;
-  }
-  for (auto& member : value) {
-    collect_leaves(member.second, path.empty() ? member.first : path + "/" + member.first, leaves);
-  }
-}
-
 }  // namespace
 
-std::map<std::string, XmlRpcValue> leaves_of(const XmlRpcValue& tree) {
+std::map<std::string, XmlRpcValue> leaves_of(const XmlRpcValue& tree, const std::string& path) {
+  if (tree.getType() != XmlRpcValue::TypeStruct) {
+    return tree.valid() && !path.empty() ? std::map{std::pair(path, tree)}
+                                         : std::map<std::string, XmlRpcValue>();
+  }
   std::map<std::string, XmlRpcValue> leaves;
-  collect_leaves(tree, "", &leaves);
+  for (auto& [name, value] : tree) {
+    leaves.merge(leaves_of(value, path.empty() ? name : path + "/" + name));
+  }
   return leaves;
 }
 
@@ -220,11 +216,6 @@ const XmlRpcValue* ParameterReader::find(const std::string& name) const {
   return value;
 }
 
-XmlRpcValue::Type ParameterReader::type(const std::string& name) const {
-  const XmlRpcValue* value = find(name);
-  return value ? value->getType() : XmlRpcValue::TypeInvalid;
-}
-
 /// Whether parameters may be below this name; adds an error, once, where something else is there.
 bool ParameterReader::is_dictionary(const std::string& name) {
   const XmlRpcValue* found = find(name);
@@ -240,7 +231,8 @@ void ParameterReader::read(const Parameter& parameter) {
   if (!names_read_.insert(name).second) return;  // its mistake is told once
   if (parameter.may_stand_alone) {
     const std::string alone = name.substr(0, name.rfind('/'));
-    const bool stands_alone = has(alone) && type(alone) != XmlRpcValue::TypeStruct;
+    const XmlRpcValue* value = find(alone);
+    const bool stands_alone = value && value->getType() != XmlRpcValue::TypeStruct;
     if (stands_alone) no_dictionaries_.insert(name = alone);  // nothing is read below it
     names_read_.insert(name);
   }
@@ -254,10 +246,6 @@ void ParameterReader::read(const Parameter& parameter) {
   const std::string text = value_text(*taker.value);
   add_error(name, "is " + (number_in(*taker.value) ? with_unit(text, parameter.range) : text) +
                       ": " + taker.needed);
-}
-
-void ParameterReader::read_all(const std::vector<Parameter>& parameters) {
-  for (const Parameter& parameter : parameters) read(parameter);
 }
 
 std::vector<std::string> ParameterReader::children(const std::string& name) {

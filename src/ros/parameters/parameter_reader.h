@@ -2,6 +2,7 @@
 
 #include <xmlrpcpp/XmlRpc.h>
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <functional>
 #include <limits>
@@ -53,12 +54,6 @@ Choice choice(Enum* value, std::vector<std::string> words) {
           static_cast<std::size_t>(*value)};
 }
 
-/// A list of so many numbers.
-struct Numbers {
-  double* first;
-  std::size_t count;
-};
-
 /// An absolute path, or an empty one.
 struct Path {
   std::string* path;
@@ -68,18 +63,22 @@ struct Path {
 struct WordOr {
   Choice word;
   std::variant<double*, std::vector<std::string>*> other;
+  std::function<void()> note_other = [] {};  ///< called where it is the other one
 };
 
 /// Lists the values of a tree that are no dictionaries, by name.
-std::map<std::string, XmlRpc::XmlRpcValue> leaves_of(const XmlRpc::XmlRpcValue& tree);
+/// @param path  the tree's own
+std::map<std::string, XmlRpc::XmlRpcValue> leaves_of(const XmlRpc::XmlRpcValue& tree,
+                                                     const std::string& path = "");
 
 using NamePairs = std::vector<std::pair<std::string, std::string>>;
 
 /// One row of a table of parameters. The place of the value holds the default.
 struct Parameter {
   static constexpr double kStartOnly = -1.0;
-  using Value = std::variant<double*, int*, std::size_t*, bool*, std::string*,
-                             std::vector<std::string>*, NamePairs*, Numbers, Path, Choice, WordOr>;
+  using Value =
+      std::variant<double*, int*, std::size_t*, bool*, std::string*, std::vector<std::string>*,
+                   NamePairs*, Eigen::Vector3d*, Path, Choice, WordOr>;
 
   std::string name;  ///< with slashes, such as "query/margin"
   Value value;
@@ -108,15 +107,15 @@ class ParameterReader {
 
   /// Reads a row. NaN is never allowed; a whole number may be written as 20000, 20000.0 or 2e4.
   void read(const Parameter& parameter);
-  void read_all(const std::vector<Parameter>& parameters);
+  void read_all(const std::vector<Parameter>& parameters) {
+    for (const Parameter& parameter : parameters) read(parameter);
+  }
 
   /// Reads the numbers of a dictionary whose names are not known before, `default` aside.
   void read_by_name(const std::string& name, const Range& range,
                     std::map<std::string, double>* numbers);
 
   bool has(const std::string& name) const { return find(name) != nullptr; }
-  /// @returns TypeInvalid where it is absent
-  XmlRpc::XmlRpcValue::Type type(const std::string& name) const;
   /// Lists the names one level below `name`; adds an error when it is not a dictionary.
   std::vector<std::string> children(const std::string& name);
 

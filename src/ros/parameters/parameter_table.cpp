@@ -182,12 +182,13 @@ Choice sensor_choice(ExtentConfig* extent) {
   return {names, set};
 }
 
-/// An angle sets the footprint's kind when all has been read.
 WordOr footprint_choice(ExtentConfig* extent) {
+  using Footprint = ExtentConfig::Footprint;
   const auto set = [extent](std::size_t i) {
-    extent->footprint = i == 0 ? ExtentConfig::Footprint::kNone : ExtentConfig::Footprint::kCamera;
+    extent->footprint = i == 0 ? Footprint::kNone : Footprint::kCamera;
   };
-  return {{{"none", "camera"}, set}, &extent->footprint_angle};
+  const auto note_angle = [extent] { extent->footprint = Footprint::kAngle; };
+  return {{{"none", "camera"}, set}, &extent->footprint_angle, note_angle};
 }
 
 /// The points of sensors: ranges, self-filter, extent.
@@ -337,20 +338,16 @@ std::vector<Parameter> object_parameters(const std::string& at, WrittenObject* w
   const std::string shape =
       written->shape < WrittenObject::kShapes.size() ? WrittenObject::kShapes[written->shape] : "";
   if (shape == "box") {
-    append({row(at + "size", Numbers{written->size.data(), 3}, kSize, "Along x, y and z.")},
-           &table);
+    table.push_back(row(at + "size", &written->size, kSize, "Along x, y and z."));
   } else if (shape == "mesh") {
-    append({row(at + "mesh", &config->mesh, ""),
-            row(at + "scale", Numbers{config->scale.data(), 3}, scale)},
-           &table);
+    append({row(at + "mesh", &config->mesh, ""), row(at + "scale", &config->scale, scale)}, &table);
   } else if (shape != "plane" && !shape.empty()) {
-    append({row(at + "radius", &written->radius, kSize)}, &table);
-    if (shape != "sphere") append({row(at + "length", &written->length, kSize)}, &table);
+    table.push_back(row(at + "radius", &written->radius, kSize));
+    if (shape != "sphere") table.push_back(row(at + "length", &written->length, kSize));
   }
   append({row(at + "frame_id", &object.frame, "Default: that of the source."),
-          row(at + "position", Numbers{written->position.data(), 3}, position),
-          row(at + "rpy", Numbers{written->rpy.data(), 3}, {"rad", -100.0, 100.0},
-              "Roll, pitch and yaw."),
+          row(at + "position", &written->position, position),
+          row(at + "rpy", &written->rpy, {"rad", -100.0, 100.0}, "Roll, pitch and yaw."),
           row(at + "margin", &object.margin, kMargin)},  // the last one: zones have none
          &table);
   return table;

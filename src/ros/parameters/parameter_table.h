@@ -45,7 +45,9 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader);
 void read_world(ParameterReader* reader, const std::string& at, SourceConfig* source);
 
 /// Reads a shape with its sizes, its place and its frame.
-/// @param at  "zones/NAME/"
-void read_placed_shape(ParameterReader* reader, const std::string& at, WorldObjectConfig* config);
+/// @param at          "zones/NAME/", for example
+/// @param has_margin  a zone has none
+void read_object(ParameterReader* reader, const std::string& at, bool has_margin,
+                 WorldObjectConfig* config);
 
 }  // namespace ist

@@ -7,7 +7,6 @@
 #include <algorithm>
 
 #include "internal/packing/packing_cache.h"
-#include "ros/common/built_add_ons.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/text.h"
 #include "ros/parameters/parameter_reader.h"
@@ -95,8 +94,8 @@ void check_unknown_space(ParameterReader* reader, const ServerConfig& config) {
 
 /// A parameter needs the add-on that it is of.
 void check_add_ons(ParameterReader* reader, const ServerConfig& config) {
+  const std::vector<std::string>& built = built_add_ons();
   const auto check = [&](const char* add_on, const char* parameter, bool is_wanted) {
-    const std::vector<std::string>& built = built_add_ons();
     if (!is_wanted || std::find(built.begin(), built.end(), add_on) != built.end()) return;
     reader->add_error(parameter, std::string("needs the add-on ") + add_on +
                                      ", which this node is built without: build it with CMake's "
@@ -121,12 +120,6 @@ std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& priva
   return XmlRpc::XmlRpcValue();
 }
 
-QueryConfig default_query() {
-  QueryConfig query;
-  query.deadline = kDefaultDeadline;
-  return query;
-}
-
 std::vector<double> JointDeceleration::of(const Kinematics& kinematics) const {
   std::vector<double> result;
   for (const Kinematics::Joint& joint : kinematics.joints()) {
@@ -134,10 +127,6 @@ std::vector<double> JointDeceleration::of(const Kinematics& kinematics) const {
     result.push_back(own == by_joint.end() ? other : own->second);
   }
   return result;
-}
-
-double deadline_of(double parameter, double period) {
-  return parameter < 0.0 ? -parameter * period : parameter;
 }
 
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {

@@ -53,13 +53,12 @@ enum class UnknownSpace { kFree, kObstacle, kReport };
 /// may take three quarters of the time until the next one, so that no scene makes answers late.
 constexpr double kDefaultDeadline = -0.75;
 
-/// How the node's queries answer by default: as the core's, but with a deadline.
-QueryConfig default_query();
-
 /// [s] The deadline of a cycle; 0: none.
 /// @param parameter  ~query/deadline
 /// @param period     [s] from one cycle to the next
-double deadline_of(double parameter, double period);
+inline double deadline_of(double parameter, double period) {
+  return parameter < 0.0 ? -parameter * period : parameter;
+}
 
 /// ~joint_deceleration: with how much [rad/s^2, m/s^2] joints brake at least; 0: not known.
 struct JointDeceleration {
@@ -80,7 +79,9 @@ struct TrajectoryConfig {
 
 /// Parameters that may change while the node runs.
 struct LiveConfig {
-  QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
+  LiveConfig() { query.deadline = kDefaultDeadline; }
+
+  QueryConfig query;  ///< its deadline is the parameter, see deadline_of()
   RepulsionConfig repulsion;
   SpeedScaleConfig speed_scale;
   /// The contact bodies that are packed so far; may be null. This is no parameter.
@@ -118,6 +119,9 @@ class ParameterError : public std::runtime_error {
  public:
   explicit ParameterError(const std::string& message) : std::runtime_error(message) {}
 };
+
+/// The add-ons that the node is built with, by the names of their folders.
+const std::vector<std::string>& built_add_ons();
 
 /// Reads and checks the parameters of the node's private namespace.
 /// @param tree      a struct, or an invalid value when nothing is set

@@ -12,8 +12,6 @@
 namespace ist {
 namespace {
 
-using XmlRpc::XmlRpcValue;
-
 // By type.
 constexpr const char* kMessages[] = {"sensor_msgs/PointCloud2", "sensor_msgs/Image",
                                      "sensor_msgs/LaserScan", "octomap_msgs/Octomap",
@@ -29,19 +27,6 @@ void read_paddings(ParameterReader* reader, const std::string& at, SourceConfig*
   *largest = source->other_padding;
   for (const auto& [link, padding] : source->link_paddings) *largest = std::max(*largest, padding);
   if (source->ingest.self_filter_mode == SelfFilterMode::kView) source->link_paddings.clear();
-}
-
-/// Completes what makes points larger than points; the view filter has the same noise.
-void complete_extent(const ParameterReader& reader, const std::string& at, IngestConfig* ingest) {
-  ExtentConfig& extent = ingest->extent;
-  const XmlRpcValue::Type footprint = reader.type(at + "footprint");
-  if (footprint == XmlRpcValue::TypeDouble || footprint == XmlRpcValue::TypeInt) {
-    extent.footprint = ExtentConfig::Footprint::kAngle;
-  }
-  if (extent.noise_constant > 0.0 || extent.noise_quadratic > 0.0) {
-    ingest->view.noise.constant = extent.noise_constant;
-    ingest->view.noise.quadratic = extent.noise_quadratic;
-  }
 }
 
 /// Adds an error where the points' radius at max_range [m] has no sensible size; `config` asks for
@@ -61,7 +46,11 @@ void read_sensor(ParameterReader* reader, const std::string& at, SourceConfig* s
   // millimetres are longer from 10 and 100 mm on. Who has a larger max_range believes more.
   ingest.sensor_range = source->type == SourceType::kDepthImage ? 10.0 : 100.0;
   read_paddings(reader, at, source);
-  complete_extent(*reader, at, &ingest);
+  const ExtentConfig& extent = ingest.extent;
+  if (extent.noise_constant > 0.0 || extent.noise_quadratic > 0.0) {
+    ingest.view.noise.constant = extent.noise_constant;
+    ingest.view.noise.quadratic = extent.noise_quadratic;
+  }
   if (!(ingest.max_range > ingest.min_range)) {
     reader->add_error(at + "max_range",
                       format_text("is %g m: it must be more than min_range, which is %g m",

@@ -41,23 +41,6 @@ std::vector<GeometryElement> geometry_of(const std::string& shape, const Written
   return {element};
 }
 
-void read_object(ParameterReader* reader, const std::string& at, bool has_margin,
-                 WorldObjectConfig* config) {
-  WrittenObject written;
-  reader->read(object_parameters(at, &written, config).front());  // the others depend on the shape
-  std::vector<Parameter> rows = object_parameters(at, &written, config);
-  if (!has_margin) rows.pop_back();
-  reader->read_all(rows);
-  require_sizes(reader, at, rows, config->mesh);
-  config->object.X_BO = pose_of(written);
-  if (written.shape == WrittenObject::kShapes.size()) {
-    if (reader->has(at + "shape")) return;
-    reader->add_error(at + "shape", "is not set: allowed is " + join(WrittenObject::kShapes, ", "));
-    return;
-  }
-  config->object.geometry = geometry_of(WrittenObject::kShapes[written.shape], written);
-}
-
 void read_objects(ParameterReader* reader, const std::string& at, WorldConfig* world) {
   const std::vector<std::string> names = reader->children(at + "objects");
   if (names.size() > world->limits.max_objects) {
@@ -78,8 +61,21 @@ void read_objects(ParameterReader* reader, const std::string& at, WorldConfig* w
 
 }  // namespace
 
-void read_placed_shape(ParameterReader* reader, const std::string& at, WorldObjectConfig* config) {
-  read_object(reader, at, false, config);
+void read_object(ParameterReader* reader, const std::string& at, bool has_margin,
+                 WorldObjectConfig* config) {
+  WrittenObject written;
+  reader->read(object_parameters(at, &written, config).front());  // the others depend on the shape
+  std::vector<Parameter> rows = object_parameters(at, &written, config);
+  if (!has_margin) rows.pop_back();
+  reader->read_all(rows);
+  require_sizes(reader, at, rows, config->mesh);
+  config->object.X_BO = pose_of(written);
+  if (written.shape == WrittenObject::kShapes.size()) {
+    if (reader->has(at + "shape")) return;
+    reader->add_error(at + "shape", "is not set: allowed is " + join(WrittenObject::kShapes, ", "));
+    return;
+  }
+  config->object.geometry = geometry_of(WrittenObject::kShapes[written.shape], written);
 }
 
 void read_world(ParameterReader* reader, const std::string& at, SourceConfig* source) {

@@ -1,6 +1,5 @@
 #include "ros/parameters/zone_config.h"
 
-#include <algorithm>
 #include <set>
 #include <variant>
 
@@ -70,11 +69,10 @@ std::string zones_fault(const std::vector<ZoneConfig>& zones) {
 std::vector<ZoneConfig> read_zones(ParameterReader* reader) {
   std::vector<ZoneConfig> zones;
   if (!reader->has("zones")) return zones;
-  const std::string folder = "zones/";
   for (const std::string& name : reader->children("zones")) {
-    const std::string at = folder + name + "/";
+    const std::string at = "zones/" + name + "/";
     WorldObjectConfig object;
-    read_placed_shape(reader, at, &object);
+    read_object(reader, at, false, &object);
     ZoneConfig zone;
     zone.name = name;
     reader->read_all(
