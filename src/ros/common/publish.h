@@ -2,6 +2,7 @@
 
 #include <ros/init.h>
 #include <ros/publisher.h>
+#include <std_msgs/Float64.h>
 
 namespace ist {
 
@@ -10,6 +11,12 @@ namespace ist {
 template <typename Message>
 void publish_message(const ros::Publisher& publisher, const Message& message) {
   if (publisher && ros::ok()) publisher.publish(message);
+}
+
+inline void publish_number(double value, const ros::Publisher& publisher) {
+  std_msgs::Float64 message;
+  message.data = value;
+  publish_message(publisher, message);
 }
 
 }  // namespace ist

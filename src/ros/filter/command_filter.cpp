@@ -60,12 +60,6 @@ void set_stamp(const ros::Time& now, Message* message) {
   }
 }
 
-void publish_scale(double scale, const ros::Publisher& publisher) {
-  std_msgs::Float64 message;
-  message.data = scale;
-  publish_message(publisher, message);
-}
-
 }  // namespace
 
 CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
@@ -98,7 +92,7 @@ CommandFilter::CommandFilter(const ros::NodeHandle& nh, const ros::NodeHandle& p
 CommandFilter::~CommandFilter() {
   timer_.stop();
   command_.shutdown();
-  publish_scale(0.0, scale_);
+  publish_number(0.0, scale_);
   halt("the filter ends");
   kLeave.sleep();
 }
@@ -141,7 +135,7 @@ void CommandFilter::receive(const Message& message) {
   FilterState state;
   const std::vector<double> velocity = filter(command, &state);
   last_command_ = state.header.stamp;
-  publish_scale(given_scale_, scale_);
+  publish_number(given_scale_, scale_);
   // Nobody could use 0 for joints that the robot lacks: those that were commanded before stop.
   const bool is_usable = can_be_used(command);
   if (!is_usable && !groups_.empty()) {
@@ -293,7 +287,7 @@ void CommandFilter::on_timer() {
   const double age = seconds_between(last_command_, now);
   if (groups_.empty() || age > config_.command_timeout) {
     const bool is_fresh = seconds_between(newest_scale_came_, now) <= config_.proximity_timeout;
-    publish_scale(is_fresh ? newest_scale_ : 0.0, scale_);
+    publish_number(is_fresh ? newest_scale_ : 0.0, scale_);
   }
   halt_late(now);
 }

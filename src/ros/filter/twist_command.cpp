@@ -18,12 +18,6 @@ using Twist = Eigen::Matrix<double, 6, 1>;
 constexpr double kSingular = 1e-3;
 constexpr double kRounding = 1e-6;  // share of a twist that may be missing
 
-Twist twist_of(const geometry_msgs::TwistStamped& message) {
-  Twist twist;
-  twist << to_vector(message.twist.linear), to_vector(message.twist.angular);
-  return twist;
-}
-
 std::string stamp_fault(const ros::Time& stamp, const CommandReader& reader) {
   const double age = seconds_between(stamp, reader.now);
   if (stamp.isZero()) return "the twist has no stamp";
@@ -86,7 +80,8 @@ Eigen::VectorXd least_velocity(const Eigen::MatrixXd& jacobian, const Eigen::Vec
 JointCommand read_command(const geometry_msgs::TwistStamped& message, const CommandReader& reader) {
   JointCommand command;
   if (!reader.kinematics) return command;
-  const Twist twist = twist_of(message);
+  Twist twist;
+  twist << to_vector(message.twist.linear), to_vector(message.twist.angular);
   const std::string frame = without_slash(message.header.frame_id);
   const std::string tool = reader.tool.empty() ? frame : reader.tool;
   command.fault = place(tool, frame, reader, &command);

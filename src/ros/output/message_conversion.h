@@ -31,11 +31,9 @@ void assign_link(const std::string& name, const LinkProximity& result,
                  const ClosingRates& closing, const std::string& source,
                  ist_proximity::LinkProximity* message);
 
-/// Makes the message of a pair of links.
 ist_proximity::LinkPairProximity pair_message(const RobotModel& robot, const LinkPair& pair,
                                               const PairProximity& result);
 
-/// Adds the box of the link's geometry.
 /// @param box_L  [m] in the link's frame; empty: not known
 void assign_box(const Eigen::AlignedBox3d& box_L, ist_proximity::LinkProximity* message);
 

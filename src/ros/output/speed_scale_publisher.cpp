@@ -24,12 +24,6 @@ constexpr char kUnknownReach[] =
 
 std::string metres(double value) { return format_text("%.3f m", value); }
 
-void publish_number(double value, const ros::Publisher& publisher) {
-  std_msgs::Float64 message;
-  message.data = value;
-  publish_message(publisher, message);
-}
-
 /// Whether the links of a message are those that were announced.
 bool are_links_of(const ProximityArray& result, const CountedLinks& links) {
   return result.links.size() == links.links.size() &&
@@ -56,8 +50,8 @@ std::string unknown_text(const SpeedScaleAnswer& answer, const ProximityArray& r
   return "stop: " + what + (result.status_text.empty() ? "" : ": " + result.status_text);
 }
 
-}  // namespace
-
+/// The sentence about a scale.
+/// @param result  the message that holds the link that decides
 std::string speed_scale_text(const SpeedScaleAnswer& answer, const ProximityArray& result) {
   if (answer.rule == SpeedRule::kUnknown) return unknown_text(answer, result);
   const auto& link = result.links[static_cast<std::size_t>(answer.link)];
@@ -76,6 +70,8 @@ std::string speed_scale_text(const SpeedScaleAnswer& answer, const ProximityArra
       return "free: " + near;
   }
 }
+
+}  // namespace
 
 SpeedScalePublisher::SpeedScalePublisher(ros::NodeHandle private_nh, const ServerConfig& config)
     : is_enabled_(config.speed_scale_enabled),

@@ -68,9 +68,4 @@ class SpeedScalePublisher {
   double min_distance_;
 };
 
-/// The sentence about a scale.
-/// @param result  the message that holds the link that decides
-std::string speed_scale_text(const SpeedScaleAnswer& answer,
-                             const ist_proximity::ProximityArray& result);
-
 }  // namespace ist

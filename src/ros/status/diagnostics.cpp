@@ -83,7 +83,6 @@ void add_source_counts(const SourceReport& source, double rate, double now, cons
   }
 }
 
-/// Adds what the self-filter by view found.
 void add_view(const SourceReport& source, const Values& add) {
   const bool is_used = source.has_snapshot && source.view.is_used;
   add("self-filter", !source.by_view ? "padding" : is_used ? "view" : "padding, not an image");

@@ -41,13 +41,10 @@ diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
                                                     const ContactModel* contacts,
                                                     ContactsWanted contacts_wanted);
 
-// Helpers to fill a DiagnosticStatus.
-
 /// Makes the status named "NODE: WHAT", of what is found of it.
 diagnostic_msgs::DiagnosticStatus make_diagnostic(const std::string& node, const std::string& what,
                                                   const Findings& findings);
 
-/// Adds values to a status.
 struct Values {
   diagnostic_msgs::DiagnosticStatus* status;
   void operator()(const std::string& key, const std::string& value) const;

@@ -22,14 +22,10 @@ void DiagnosticsPublisher::log_status(std::uint8_t status, const std::string& te
   if (status == kOk) {
     if (logged_ != kOk) ROS_INFO("the status is OK again");
     logged_ = kOk;
-    bad_ = since_logged_ = 0;
+    since_logged_ = 0;
     return;
   }
-  ++bad_;
-  ++since_logged_;
-  const bool is_due = logged_ == kOk ? bad_ >= kPatience
-                                     : since_logged_ >= (status == logged_ ? kRepeat : kPatience);
-  if (!is_due) return;
+  if (++since_logged_ < (status == logged_ ? kRepeat : kPatience)) return;
   ROS_WARN_STREAM(text);
   logged_ = status;
   since_logged_ = 0;

@@ -49,8 +49,7 @@ class DiagnosticsPublisher {
   /// Since when there has been a finding, by what it concerns and its kind.
   std::map<std::pair<std::string, Rank>, std::chrono::steady_clock::time_point> since_;
   std::uint8_t logged_ = 0;  ///< the status that was logged last
-  int bad_ = 0;              ///< [s] for which the status has not been OK
-  int since_logged_ = 0;     ///< [s]
+  int since_logged_ = 0;     ///< [s] for which the status has not been OK, or since it was logged
 };
 
 }  // namespace ist

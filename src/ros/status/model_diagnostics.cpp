@@ -73,7 +73,6 @@ std::string packing_text(const LinkModel& link) {
 
 double megabytes(std::size_t bytes) { return 1e-6 * static_cast<double>(bytes); }
 
-/// Adds how far background packing has got.
 void add_packings(const ModelState& state, const Values& add) {
   if (!state.robot) return;
   std::size_t usable = 0, final = 0, spheres = 0, fields = 0, coarse_fields = 0;

@@ -79,7 +79,6 @@ std::string links(std::size_t count) {
   return std::to_string(count) + (count == 1 ? " link" : " links");
 }
 
-/// Adds what a deadline has cost.
 void note_deadline(const DeadlineCost& cost, Findings* findings) {
   if (!cost.any()) return;
   const auto say = [findings](const std::string& text) {

@@ -57,7 +57,6 @@ using Findings = std::vector<Finding>;
 
 /// Adds a finding, with the usual code and level of its kind; none where the text is empty.
 void note(Rank rank, const std::string& what, const std::string& text, Findings* findings);
-/// Adds one for each text.
 void note(Rank rank, const std::string& what, const std::vector<std::string>& texts,
           Findings* findings);
 
