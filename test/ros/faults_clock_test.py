@@ -45,17 +45,13 @@ class FaultsClockTest(faults.FaultTest):
         self.sensor.resume()
         return message, reaction, self.recover(node, again), limit
 
-    def test_forward(self):
+    def test_jumps(self):
         node = self.start()
-        message, reaction, recovery, limit = self.jump(node, 10.0)
-        self.record("/clock jumps forward", "by 10 s, with use_sim_time", message, reaction,
-                    "with the next inputs", recovery, limit)
-
-    def test_back(self):
-        node = self.start()
-        message, reaction, recovery, limit = self.jump(node, -10.0)
-        self.record("/clock jumps back", "by 10 s, with use_sim_time", message, reaction,
-                    "with the next inputs", recovery, limit)
+        for way, seconds in (("forward", 10.0), ("back", -10.0)):
+            with self.subTest(way):
+                message, reaction, recovery, limit = self.jump(node, seconds)
+                self.record("/clock jumps " + way, "by 10 s, with use_sim_time", message, reaction,
+                            "with the next inputs", recovery, limit)
 
 
 if __name__ == "__main__":

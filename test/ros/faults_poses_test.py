@@ -106,6 +106,20 @@ class PosesTest(faults.FaultTest):
         self.tf.paused = False
         return message, reaction, self.recover(node, since)
 
+    def break_poses(self, node, text, links=BOTH, function=None, offset=0.0):
+        """Sends other poses for a while; returns message, reaction [ms] and recovery [ms]."""
+        last = self.pause(node)
+        whole, self.tf.function = self.tf.function, function or self.tf.function
+        self.offset, self.tf.paused = offset, False
+        message, reaction = self.react(
+            node, last, ProximityArray.NO_POSE, text, links, timeout=POSE_TIMEOUT
+        )
+        self.halt()
+        self.tf.function, self.offset = whole, 0.0
+        since = time.monotonic()
+        self.tf.paused = False
+        return message, reaction, self.recover(node, since)
+
     def test_tf_stops(self):
         message, reaction, recovery = self.stop_and_resume(self.start(), "ball_link")
         self.record("tf stops", "no link's transform any more", message, reaction,
@@ -113,20 +127,13 @@ class PosesTest(faults.FaultTest):
 
     def test_tf_ahead_then_stops(self):
         self.offset, self.ball, self.is_ahead = 0.4, lambda: 0.05, True
-        node = self.start()
-        last = self.halt()
-        message, reaction = self.react(node, last, ProximityArray.NO_POSE, "", BOTH,
-                                       timeout=POSE_TIMEOUT)
-        since = time.monotonic()
-        self.offset, self.tf.paused = 0.0, False
-        recovery = self.recover(node, since)
+        message, reaction, recovery = self.stop_and_resume(self.start(), "")
         self.record("tf's clock is ahead, then tf stops", "stamps 0.4 s ahead; then no transform",
                     message, reaction, "with transforms of the present", recovery, LIMIT)
 
     def test_one_frame_stops(self):
         """The other link goes on, at the present."""
         node = self.start()
-        both = self.send_tf
 
         def box_is_missing():
             stamp = rospy.Time.now()
@@ -135,18 +142,9 @@ class PosesTest(faults.FaultTest):
             self.world.publish_transforms([pt.transform_message("base", "ball_link", X, stamp)])
             self.poses.add(stamp, OBSTACLE[0, 2] - z - pt.BALL_RADIUS)
 
-        last = self.pause(node)
-        self.tf.function = box_is_missing
-        self.tf.paused = False
         # While the box's pose counts, the instant of all poses is the box's.
-        message, reaction = self.react(node, last, ProximityArray.NO_POSE, "box_link", ("box_link",),
-                                       timeout=POSE_TIMEOUT)
+        message, reaction, recovery = self.break_poses(node, "box_link", ("box_link",), box_is_missing)
         self.assertTrue(self.known(message))
-        self.halt()
-        self.tf.function = both
-        since = time.monotonic()
-        self.tf.paused = False
-        recovery = self.recover(node, since)
         self.record("one link's transform stops", "the other links' go on", message, reaction,
                     "the others stay known; with its next transform", recovery, LIMIT)
 
@@ -170,16 +168,7 @@ class PosesTest(faults.FaultTest):
                     said="every distance is that of the pose at header.stamp")
 
     def test_tf_goes_back_in_time(self):
-        node = self.start()
-        last = self.pause(node)
-        self.offset = -5.0
-        self.tf.paused = False
-        message, reaction = self.react(node, last, ProximityArray.NO_POSE, "", BOTH,
-                                       timeout=POSE_TIMEOUT)
-        self.halt()
-        since = time.monotonic()
-        self.offset, self.tf.paused = 0.0, False
-        recovery = self.recover(node, since)
+        message, reaction, recovery = self.break_poses(self.start(), "", offset=-5.0)
         self.record("tf's clock goes back", "stamps jump back by 5 s", message, reaction,
                     "with transforms of the present", recovery, LIMIT)
 
@@ -254,22 +243,13 @@ class JointsTest(PosesTest):
     def test_one_joint_is_refused(self):
         """One joint is NaN while the other goes on: its links are not called current."""
         node = self.start()
-        last = self.pause(node)
 
         def send_with_nan():
             message = JointState(name=["turn", "slide"], position=[0.3, np.nan])
             message.header.stamp = rospy.Time.now()
             self.publisher.publish(message)
 
-        whole, self.tf.function = self.tf.function, send_with_nan
-        self.tf.paused = False
-        message, reaction = self.react(node, last, ProximityArray.NO_POSE, "slide", BOTH,
-                                       timeout=POSE_TIMEOUT)
-        self.halt()
-        since = time.monotonic()
-        self.tf.function = whole
-        self.tf.paused = False
-        recovery = self.recover(node, since)
+        message, reaction, recovery = self.break_poses(node, "slide", function=send_with_nan)
         self.record("one joint is NaN", "the other joints of the message are right", message,
                     reaction, "with its next position", recovery, LIMIT)
 

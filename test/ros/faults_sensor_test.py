@@ -15,11 +15,45 @@ LIMIT = CLOUD_TIMEOUT + PERIOD
 AGAIN = "with the next cloud"
 
 
+STALE, NOTHING = ProximityArray.STALE_CLOUD, ProximityArray.NO_CLOUD
+
+
+def seen_from(X, frame, message):
+    """The sensor's point in the frame of a camera that is elsewhere."""
+    z = np.frombuffer(message.data, "<f4")[2]
+    return pt.cloud(pt.apply(pt.inverse(X), [[0, 0, z]]), frame, message.header.stamp)
+
+
+def set_to(name, value):
+    return lambda message, last: setattr(message, name, value)
+
+
+# The fault, what was done, status and words of the message, what is sent in place of a message (and of
+# the last one before), the offset of stamps [s], and after what the node recovers.
+UNUSABLE = [
+    ("sensor freezes", "the same cloud, same stamp, at 30 Hz", STALE, "",
+     lambda message, last: last, 0.0, AGAIN),
+    ("sensor's clock goes back", "stamps jump back by 5 s", STALE, "",
+     lambda message, last: None, -5.0, AGAIN + " of the right time"),
+    ("sensor changes its frame", "a frame_id that tf does not know", STALE, "nowhere",
+     lambda message, last: setattr(message.header, "frame_id", "nowhere"), 0.0, AGAIN + " in a known frame"),
+    ("sensor changes its layout", "clouds without x, y, z", STALE, "",
+     set_to("fields", [PointField("rgb", 0, PointField.FLOAT32, 1)]), 0.0, AGAIN),
+    ("sensor contradicts itself", "clouds of width 0 with data", STALE, "", set_to("width", 0), 0.0, AGAIN),
+    ("sensor's clouds are cut off", "clouds with a byte less than they say", STALE, "",
+     lambda message, last: setattr(message, "data", message.data[:-1]), 0.0, AGAIN),
+    ("sensor is covered", "every point is NaN", NOTHING, "NaN",
+     lambda message, last: pt.cloud(np.full((1, 3), np.nan), stamp=message.header.stamp), 0.0, AGAIN),
+]
+
+
 class FaultsSensorTest(faults.FaultTest):
-    def break_sensor(self, node, status, text, change=None, offset=0.0, is_usable=False):
+    def break_sensor(self, node, status, text, change, offset):
         """Changes what the sensor sends; returns message, reaction [ms] and recovery [ms]."""
         last = self.sensor.pause(node)
-        self.sensor.change, self.sensor.offset, self.sensor.is_usable = change, offset, is_usable
+        frozen = self.sensor.last
+        self.sensor.change = lambda message: change(message, frozen)
+        self.sensor.offset, self.sensor.is_usable = offset, False
         self.sensor.resume()
         message, reaction = self.react(node, last, status, text)
         self.sensor.halt()
@@ -28,82 +62,47 @@ class FaultsSensorTest(faults.FaultTest):
         self.sensor.resume()
         return message, reaction, self.recover(node, since)
 
+    def test_what_cannot_be_used(self):
+        node = self.start()
+        for fault, done, status, text, change, offset, again in UNUSABLE:
+            with self.subTest(fault):
+                message, reaction, recovery = self.break_sensor(node, status, text, change, offset)
+                self.record(fault, done, message, reaction, again, recovery, LIMIT)
+
     def test_stops(self):
+        """Stamps that were ahead of the clock do not lengthen the timeout."""
         node = self.start()
-        last = self.sensor.pause(node)
-        message, reaction = self.react(node, last, ProximityArray.STALE_CLOUD, "driver stopped")
-        since = time.monotonic()
-        self.sensor.resume()
-        recovery = self.recover(node, since)
-        self.record(
-            "sensor stops", "no cloud any more", message, reaction, AGAIN, recovery, LIMIT
-        )
+        for fault, done, offset, text in (
+            ("sensor stops", "no cloud any more", 0.0, "driver stopped"),
+            # Its clouds wait for tf, ten at most.
+            ("sensor's clock is ahead, then it stops", "stamps 0.28 s ahead; no cloud any more", 0.28, ""),
+        ):
+            with self.subTest(fault):
+                self.sensor.offset = offset
+                last = self.sensor.pause(node)
+                message, reaction = self.react(node, last, STALE, text)
+                self.sensor.offset = 0.0
+                since = time.monotonic()
+                self.sensor.resume()
+                recovery = self.recover(node, since)
+                self.record(fault, done, message, reaction, AGAIN, recovery, LIMIT)
 
-    def test_freezes(self):
-        """The driver sends its last cloud again and again, with the same stamp."""
+    def test_what_else_can_be_used(self):
+        """A frame that tf knows is followed; float64 of the other byte order is read."""
         node = self.start()
-        last = self.sensor.pause(node)
-        frozen = self.sensor.last
-        result = self.break_sensor_frozen(node, frozen, last)
-        self.record("sensor freezes", "the same cloud, same stamp, at 30 Hz", *result, LIMIT)
-
-    def break_sensor_frozen(self, node, frozen, last):
-        self.sensor.change = lambda message: frozen
-        self.sensor.is_usable = False
-        self.sensor.resume()
-        message, reaction = self.react(node, last, ProximityArray.STALE_CLOUD)
-        self.sensor.halt()
-        self.sensor.change, self.sensor.is_usable = None, True
-        since = time.monotonic()
-        self.sensor.resume()
-        return message, reaction, AGAIN, self.recover(node, since)
-
-    def test_goes_back_in_time(self):
-        node = self.start()
-        result = self.break_sensor(node, ProximityArray.STALE_CLOUD, "", offset=-5.0)
-        message, reaction, recovery = result
-        self.record("sensor's clock goes back", "stamps jump back by 5 s", message, reaction,
-                    AGAIN + " of the right time", recovery, LIMIT)
-
-    def test_stamps_ahead_then_stops(self):
-        """Stamps that are ahead of the clock do not lengthen the timeout."""
-        self.sensor.offset = 0.28  # its clouds wait for tf, ten at most
-        node = self.start()
-        last = self.sensor.pause(node)
-        message, reaction = self.react(node, last, ProximityArray.STALE_CLOUD)
-        self.sensor.offset = 0.0
-        since = time.monotonic()
-        self.sensor.resume()
-        recovery = self.recover(node, since)
-        self.record("sensor's clock is ahead, then it stops", "stamps 0.28 s ahead; no cloud any more",
-                    message, reaction, AGAIN, recovery, LIMIT)
-
-    def test_changes_frame(self):
-        """To one that tf does not know; and to one that it knows, which is followed."""
-        node = self.start()
-
-        def to_nowhere(message):
-            message.header.frame_id = "nowhere"
-
-        message, reaction, recovery = self.break_sensor(
-            node, ProximityArray.STALE_CLOUD, "nowhere", to_nowhere
-        )
-        self.record("sensor changes its frame", "a frame_id that tf does not know", message,
-                    reaction, AGAIN + " in a known frame", recovery, LIMIT)
-
         X = pt.transform((0.2, -0.3, 0.1), axis=(0.6, 0, 0.8), angle=1.2)
         self.world.poses["other_camera"] = ("base", X)
 
-        def to_other(message):
-            z = np.frombuffer(message.data, "<f4")[2]
-            moved = pt.apply(pt.inverse(X), [[0, 0, z]])
-            return pt.cloud(moved, "other_camera", message.header.stamp)
+        def to_float64(message):
+            points = np.frombuffer(message.data, "<f4").reshape(-1, 3)
+            return pt.cloud(points, stamp=message.header.stamp, dtype=">f8")
 
-        self.sensor.pause(node)
-        self.sensor.change = to_other
-        self.sensor.resume()
-        for message in node.next_messages(60)[30:60]:
-            self.assertEqual(message.status, ProximityArray.OK, message.status_text)
+        for change in (lambda message: seen_from(X, "other_camera", message), to_float64):
+            self.sensor.pause(node)
+            self.sensor.change = change
+            self.sensor.resume()
+            for message in node.next_messages(60)[30:60]:
+                self.assertEqual(message.status, ProximityArray.OK, message.status_text)
 
     def test_sensors_on_one_topic(self):
         """Each cloud would hide what the other sensors see."""
@@ -116,67 +115,14 @@ class FaultsSensorTest(faults.FaultTest):
 
         def by_turns(message, sensors):
             i = next(turn) % sensors
-            z = np.frombuffer(message.data, "<f4")[2]
-            moved = pt.apply(pt.inverse(X[i]), [[0, 0, z]])
-            return pt.cloud(moved, frames[i], message.header.stamp)
+            return seen_from(X[i], frames[i], message)
 
         for sensors in (2, 3):
             with self.subTest(sensors):
                 self.sensor.change = lambda message, n=sensors: by_turns(message, n)
-                node.wait_for_status(ProximityArray.STALE_CLOUD, "by turns in the frames")
+                node.wait_for_status(STALE, "by turns in the frames")
                 self.sensor.change = None
                 node.wait_for_status(ProximityArray.OK)
-
-    def test_changes_layout(self):
-        """To float64 of the other byte order, which is read; to clouds that no one can read."""
-        node = self.start()
-
-        def to_float64(message):
-            points = np.frombuffer(message.data, "<f4").reshape(-1, 3)
-            return pt.cloud(points, stamp=message.header.stamp, dtype=">f8")
-
-        self.sensor.pause(node)
-        self.sensor.change = to_float64
-        self.sensor.resume()
-        for message in node.next_messages(60)[30:60]:
-            self.assertEqual(message.status, ProximityArray.OK, message.status_text)
-
-        def to_colours(message):
-            message.fields = [PointField("rgb", 0, PointField.FLOAT32, 1)]
-
-        message, reaction, recovery = self.break_sensor(
-            node, ProximityArray.STALE_CLOUD, "", to_colours
-        )
-        self.record("sensor changes its layout", "clouds without x, y, z", message, reaction, AGAIN,
-                    recovery, LIMIT)
-
-        def to_size_zero(message):
-            message.width = 0
-
-        message, reaction, recovery = self.break_sensor(
-            node, ProximityArray.STALE_CLOUD, "", to_size_zero
-        )
-        self.record("sensor contradicts itself", "clouds of width 0 with data", message, reaction,
-                    AGAIN, recovery, LIMIT)
-
-        def to_short(message):
-            message.data = message.data[:-1]
-
-        message, reaction, recovery = self.break_sensor(
-            node, ProximityArray.STALE_CLOUD, "", to_short
-        )
-        self.record("sensor's clouds are cut off", "clouds with a byte less than they say", message,
-                    reaction, AGAIN, recovery, LIMIT)
-
-    def test_sees_nothing(self):
-        node = self.start()
-
-        def to_nan(message):
-            return pt.cloud(np.full((1, 3), np.nan), stamp=message.header.stamp)
-
-        message, reaction, recovery = self.break_sensor(node, ProximityArray.NO_CLOUD, "NaN", to_nan)
-        self.record("sensor is covered", "every point is NaN", message, reaction, AGAIN, recovery,
-                    LIMIT)
 
 
 if __name__ == "__main__":
