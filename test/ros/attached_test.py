@@ -72,10 +72,7 @@ class AttachedTest(pt.NodeTest):
         # The status is OK all the time, or NO_CLOUD until the next cloud.
         for m in node.messages[begin:]:
             self.assertIn(m.status, (ProximityArray.OK, ProximityArray.NO_CLOUD))
-        node.wait_until(
-            lambda: "'tool' on 'ball_link'" in node.diagnostic("model", "attached object"),
-            "the tool in diagnostics",
-        )
+        node.wait_for_value("model", "attached object", "'tool' on 'ball_link'")
 
         # The tool stays attached when the model is loaded again.
         begin = len(node.messages)
@@ -110,9 +107,7 @@ class AttachedTest(pt.NodeTest):
         self.attach_well()
         rospy.set_param(self.namespace + "/robot_description", pt.urdf().replace("ball_link", "other_link"))
         self.assertTrue(node.reload().success)
-        node.wait_until(
-            lambda: "no longer attached" in node.diagnostic("model", "warning"), "the object that is gone"
-        )
+        node.wait_for_value("model", "warning", "no longer attached")
 
     def test_shapes_and_faults(self):
         node = self.start(links=["box_link"])

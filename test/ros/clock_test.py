@@ -2,13 +2,12 @@
 """Simulated time: no clock yet, a clock that stands still, and one that jumps back."""
 
 import threading
-import unittest
 
 import numpy as np
 import proximity_testing as pt
 import rospy
-from joint_states_test import ARM, JointStatesTest, joint_state
-from memory_test import BALL, FAR, NEAR, VOXEL, distance_to
+from joint_states_test import ARM
+from memory_test import BALL, FAR, LASTING, NEAR, VOXEL, distance_to
 from proximity_testing import LinkProximity, ProximityArray
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -44,10 +43,8 @@ class JointRobot:
     """The arm of joint_states_test, standing still: a node, its joint states and its clouds."""
 
     def __init__(self, namespace):
-        q = {"turn": 0.3, "slide": 0.5}
-        joints = JointStatesTest.joint_publisher(namespace)
         self.world = pt.World(namespace, None)
-        self.world.repeat(50, lambda: joints.publish(joint_state(q)))
+        self.world.start_joints({"turn": 0.3, "slide": 0.5}, rate=50)
         self.world.start_points([[0.6, 0.6, 0.6]])
         self.node = pt.ProximityNode(namespace, {"pose_source": "joint_states"}, ARM)
 
@@ -58,22 +55,25 @@ class JointRobot:
         test.assertEqual(self.node.stop(), 0)
 
 
-class ClockTest(unittest.TestCase):
+class ClockTest(pt.NodeTest):
+    def setUp(self):
+        super().setUp()
+        self.clock = SimulatedClock()
+        self.addCleanup(self.clock.stop)
+
     def test_clock(self):
-        clock = SimulatedClock()
-        node = pt.ProximityNode("/clock_test", {"rate": 50}, pt.urdf())
+        clock, world = self.clock, self.world
+        node = self.start(rate=50)
         node.wait_for_unknown(ProximityArray.NO_CLOUD, "/clock")
 
         clock.start()
         pt.wait_until(lambda: not rospy.Time.now().is_zero(), "the clock")
-        world = pt.World("/clock_test").stand(box=pt.transform((0, 0.8, 0)))
         world.points = np.array([[0.0, 0.0, 0.3]])
         world.start_tf()
         world.start_clouds()
         node.wait_for_status(ProximityArray.OK)
 
-        spheres = []
-        node.subscribe("spheres", MarkerArray, spheres.append)
+        spheres = node.collect("spheres", MarkerArray)
         pt.wait_until(lambda: spheres, "~spheres")
 
         # The clock stands still: answers go on, and nothing becomes stale.
@@ -138,23 +138,17 @@ class ClockTest(unittest.TestCase):
         self.assertIn("ball_link", message.status_text)
         self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.UNKNOWN)
         future.stop()
-        for m in node.messages:
-            pt.check_invariants(self, m)
-        world.stop()
-        self.assertEqual(node.stop(), 0)
-        clock.stop()
 
     # What is hidden from the camera is remembered, whatever the clock does.
     def test_memory_of_a_clock_that_is_set_back(self):
-        clock = SimulatedClock()
+        clock, world = self.clock, self.world
         clock.start()
-        world = pt.World("/clock_memory").stand(pt.transform(BALL), pt.transform((0, 0, 5)))
+        world.stand(pt.transform(BALL), pt.transform((0, 0, 5)))
         world.points = FAR
         world.start_tf()
         world.start_clouds()
-        parameters = {"rate": 50, "links": ["ball_link"], "max_distance": 0.8}
-        parameters["memory"] = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
-        node = pt.ProximityNode("/clock_memory", parameters, pt.urdf())
+        self.MAX_DISTANCE = 0.8
+        node = self.start(rate=50, links=["ball_link"], max_distance=0.8, memory=LASTING)
         ball = lambda m: pt.link(m, "ball_link")  # noqa: E731
         node.wait_for(lambda m: m.status == 0 and ball(m).source == "cloud", "the far patch")
         world.points = NEAR
@@ -172,13 +166,10 @@ class ClockTest(unittest.TestCase):
                     self.assertLessEqual(ball(m).lower_bound, distance_to(FAR))
                 else:
                     self.assertTrue(pt.all_unknown(m))
-        world.stop()
-        self.assertEqual(node.stop(), 0)
-        clock.stop()
 
     def test_filter_without_commands(self):
         """The last command is from the future then, and 0 is given all the same."""
-        clock = SimulatedClock()
+        clock = self.clock
         clock.start()
         rospy.set_param("/clock_filter/robot_description", SLIDES)
         one = Filter("/clock_filter", command_type="sensor_msgs/JointState")
@@ -192,7 +183,6 @@ class ClockTest(unittest.TestCase):
         pt.wait_until(lambda: len(one.given) > begin + 20, "velocities of 0")
         self.assertFalse(any(np.any(m.velocity) for m in one.given))
         self.assertEqual(one.stop(), 0)
-        clock.stop()
 
 
 if __name__ == "__main__":

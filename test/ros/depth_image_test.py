@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Depth images as a source: the distances of their points, what is malformed, and silence."""
 
-import contextlib
 import re
 
 import numpy as np
@@ -86,13 +85,8 @@ class DepthImageTest(pt.NodeTest):
         if self.info is not None:
             self.world.repeat(10, lambda: self.infos[topic].publish(self.info))
 
-    @contextlib.contextmanager
     def stream(self, make, rate=20):
-        repeater = self.world.repeat(rate, lambda: self.images.publish(make()))
-        try:
-            yield repeater
-        finally:
-            repeater.stop()
+        return self.world.repeat(rate, lambda: self.images.publish(make()))
 
     def check_wall(self, **format):
         seen = pt.apply(X_BASE_CAMERA, points(depths()))
@@ -131,24 +125,22 @@ class DepthImageTest(pt.NodeTest):
         truth = pt.distance_to_ball(seen).min()
         self.assertAlmostEqual(pt.link(answer, "ball_link").distance, truth, 5)
 
+    def wait_for_reason(self, words):
+        message = self.node.wait_for(lambda m: m.status != 0 and words in m.status_text, words)
+        self.assertTrue(pt.all_unknown(message))
+        return message
+
     def test_malformed(self):
         self.start_camera()
         self.check_wall()
         for members, words in MALFORMED:
             with self.subTest(words), self.stream(lambda m=members: malformed(m)):
-                message = self.node.wait_for(
-                    lambda m: m.status != 0 and words in m.status_text, words
-                )
-                self.assertIn("malformed image", message.status_text)
-                self.assertTrue(pt.all_unknown(message))
+                self.assertIn("malformed image", self.wait_for_reason(words).status_text)
         self.check_wall()
         for members, words in BAD_CAMERAS:
             self.info = camera_info(**members)
             with self.subTest(words), self.stream(lambda: image(depths())):
-                message = self.node.wait_for(
-                    lambda m: m.status != 0 and words in m.status_text, words
-                )
-                self.assertTrue(pt.all_unknown(message))
+                self.wait_for_reason(words)
         self.info = camera_info(frame="another")
         with self.stream(lambda: image(depths())):
             self.node.wait_for_status(ProximityArray.STALE_CLOUD, "is of 'another'")
@@ -172,12 +164,6 @@ class DepthImageTest(pt.NodeTest):
             lambda: self.node.log().count("has distortion coefficients") == 1, "the warning"
         )
 
-    def radius(self, seen, k, a, b, calibration, moved):
-        """Of each point, from its range: what the parameters of test_extent state."""
-        ranges = np.linalg.norm(seen - X_BASE_CAMERA[:3, 3], axis=1)
-        pixel = np.sqrt(0.5) / np.cos(1.0472) / FOCAL_LENGTH
-        return k * (a + b * ranges**2) + calibration + pixel * ranges + moved
-
     def test_extent(self):
         """Noise, footprint and latency: the bound is that of a sphere about each point."""
         self.start_camera(
@@ -187,7 +173,9 @@ class DepthImageTest(pt.NodeTest):
         )
         self.check_wall()  # the distance stays that of the nearest point
         seen = pt.apply(X_BASE_CAMERA, points(depths()))
-        radius = self.radius(seen, 3, 0.001, 0.004, 0.003, 0.02 * 1.6)
+        ranges = np.linalg.norm(seen - X_BASE_CAMERA[:3, 3], axis=1)
+        pixel = np.sqrt(0.5) / np.cos(1.0472) / FOCAL_LENGTH
+        radius = 3 * (0.001 + 0.004 * ranges**2) + 0.003 + pixel * ranges + 0.02 * 1.6
         self.assertGreater(radius.min(), 0.02)
         with self.stream(lambda: image(depths())):
             answer = self.node.wait_for_status(ProximityArray.OK)
@@ -206,10 +194,7 @@ class DepthImageTest(pt.NodeTest):
         self.start(sources={"c": {"topic": "points", "footprint": "camera", "noise": "kinect_v1"}})
         self.world.start_tf()
         self.world.repeat(20, lambda: clouds.publish(pt.cloud(points(depths()))))
-        message = self.node.wait_for(
-            lambda m: "the footprint of a point is asked for" in m.status_text, "the reason"
-        )
-        self.assertTrue(pt.all_unknown(message))
+        self.wait_for_reason("the footprint of a point is asked for")
 
     def test_wrong_topic(self):
         """A topic of another type is named; else the topics that a source could have."""

@@ -78,9 +78,7 @@ class FaultsProcessTest(faults.FaultTest):
         self.send_inputs()
         node = self.launch()
         node.wait_for_status(ProximityArray.OK)
-        node.wait_until(
-            lambda: "coarse" in node.diagnostic("model", "mesh_0"), "packing in the background"
-        )
+        node.wait_for_value("model", "mesh_0", "coarse")  # packing in the background
         self.kill(node)
         message, recovery = self.start_again(time.monotonic())
         self.record("kill -9 while packing", "the node is started again", message, None,

@@ -3,9 +3,7 @@
 
 import os
 import tempfile
-import threading
 import time
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -13,9 +11,8 @@ import rosbag
 import rospy
 from ist_proximity.msg import FilterState
 from proximity_testing import LinkProximity, ProximityArray
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-from velocity_filter_test import JOINTS, PERIOD, RADIUS, SLIDES, STOP, Filter, wall
+from velocity_filter_test import JOINTS, PERIOD, RADIUS, SLIDES, STOP, Filter, SlidesTest
 
 APPROACH, MARGIN, PROXIMITY_TIMEOUT = 0.2, 0.01, 0.2  # the filter's defaults
 LIMITS = [2.0, 0.4]  # [m/s] of the URDF
@@ -40,40 +37,20 @@ def record(path):
             bag.write("command", JointTrajectory(joint_names=JOINTS, points=[point]), rospy.Time(1.0 + PERIOD * k))
 
 
-class FilterReplayTest(unittest.TestCase):
+class FilterReplayTest(SlidesTest):
     def setUp(self):
-        self.namespace = "/replay"
-        self.world = pt.World(self.namespace)
-        self.points = self.world.points = wall()
-        self.world.start_clouds()
-        self.lock = threading.Lock()
-        self.q, self.velocity = np.array([0.3, 0.0]), np.zeros(2)
-        self.way = []  # positions
-        self.joints = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
-        self.filter = None
-        self.robot = self.world.repeat(1.0 / PERIOD, self.move)
-        self.node = pt.ProximityNode(
-            self.namespace, {"pose_source": "joint_states", "self_filter": False}, SLIDES
-        )
+        self.positions = []
+        super().setUp()
+        with self.lock:
+            self.q = np.array([0.3, 0.0])
+        self.start(SLIDES, pose_source="joint_states", self_filter=False)
         self.node.wait_for_status(ProximityArray.OK)
         self.filter = FilterNodelet(self.namespace)
         pt.wait_until(lambda: self.filter.is_heard(), "the filter's topics")
 
-    def tearDown(self):
-        self.world.stop()
-        self.filter.stop()
-        self.assertEqual(self.node.stop(), 0)
-
-    def move(self):
-        """One period of the robot, which follows the last velocity that it was given."""
-        with self.lock:
-            if self.filter and self.filter.given:
-                self.velocity = np.array(self.filter.given[-1].points[0].velocities)
-            self.q = self.q + PERIOD * self.velocity
-            state = JointState(name=JOINTS, position=list(self.q))
-            state.header.stamp = rospy.Time.now()
-            self.way.append(self.q)
-        self.joints.publish(state)
+    def send_joints(self, q):
+        self.positions.append(q)
+        super().send_joints(q)
 
     def replay(self, path):
         with rosbag.Bag(path) as bag:
@@ -85,7 +62,7 @@ class FilterReplayTest(unittest.TestCase):
         return [message.points[0].velocities for _, message in stream]
 
     def distance_at(self, q):
-        return np.linalg.norm(np.append(q, 0.0) - self.points, axis=1).min() - RADIUS
+        return np.linalg.norm(np.append(q, 0.0) - self.world.points, axis=1).min() - RADIUS
 
     @staticmethod
     def row_of(answer):
@@ -123,7 +100,7 @@ class FilterReplayTest(unittest.TestCase):
             if state.status != FilterState.FAULT:
                 self.assertTrue(any(G @ given <= h + 1e-6 for G, h in rows), (given, rows))
             self.assertTrue((np.abs(given) <= np.add(LIMITS, 1e-6)).all(), given)
-        distances = np.array([self.distance_at(q) for q in self.way])
+        distances = np.array([self.distance_at(q) for q in self.positions])
         self.assertGreater(distances.min(), MARGIN)
         at_wall = np.flatnonzero(distances < STOP + 0.1)
         self.assertTrue(at_wall.size, "it has come to the wall")

@@ -4,7 +4,7 @@
 import numpy as np
 import proximity_testing as pt
 import rospy
-from proximity_testing import LinkProximity, ProximityArray
+from proximity_testing import LinkProximity, ProximityArray, joint_state
 from sensor_msgs.msg import JointState, PointCloud2
 from stall_meter import undisturbed
 
@@ -55,13 +55,6 @@ def arm_jacobians(turn, slide):
 def motion(t):
     """Positions at a time [s]."""
     return {"turn": np.sin(0.7 * t), "slide": 0.4 + 0.2 * np.sin(t)}
-
-
-def joint_state(positions, stamp=None, velocities=()):
-    message = JointState(name=list(positions), position=list(positions.values()))
-    message.velocity = list(velocities)
-    message.header.stamp = rospy.Time.now() if stamp is None else stamp
-    return message
 
 
 class JointStatesTest(pt.NodeTest):
@@ -209,15 +202,12 @@ class JointStatesTest(pt.NodeTest):
             X = arm_poses(**self.still)
             self.world.points = pt.apply(pt.inverse(X["camera"]), seen)
 
-        def dropped():
-            return node.diagnostic("input cloud", "points outside the region of interest")
-
         stand(0.5)
         self.world.repeat(50, lambda: self.send("turn", "slide"))
         self.world.start_clouds()
         message = node.wait_for_status(ProximityArray.OK)
         self.assertEqual(message.sources[0].points_used, 2)
-        node.wait_until(lambda: dropped() == "1", "a point outside the region of interest")
+        node.wait_for_value("input cloud", "points outside the region of interest", "^1$")
         self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.NEAR)
 
         stand(3.4)  # at the far point, but for 1.4 m
@@ -225,8 +215,7 @@ class JointStatesTest(pt.NodeTest):
         node.wait_for(lambda m: pt.all_unknown(m), "nothing known")
 
         # While somebody subscribes to the cloud, neither it nor the links' view is cropped.
-        clouds = []
-        node.subscribe("filtered_cloud", PointCloud2, clouds.append)
+        clouds = node.collect("filtered_cloud", PointCloud2)
         message = node.wait_for_status(ProximityArray.OK)
         node.wait_until(lambda: clouds and clouds[-1].width == 2, "both points")
         self.assertTrue(all(s == LinkProximity.CLEAR for s in pt.states(message)), message)
@@ -258,9 +247,7 @@ class JointStatesTest(pt.NodeTest):
         self.assertTrue(all(m.status == ProximityArray.OK for m in messages))
         told = "taken to have none: 'slide', 'turn'"
         self.assertEqual(node.log().count(told), 1)
-        node.wait_until(
-            lambda: told in node.diagnostic("model", "warning"), "the joints in the diagnostics"
-        )
+        node.wait_for_value("model", "warning", told)
 
     def test_moving(self):
         """Poses belong to the stamp; clouds of a camera on a link, late, with the robot in view;
@@ -359,8 +346,7 @@ class JointStatesTest(pt.NodeTest):
         self.assertEqual(check.joints, ["turn", "slide"])
 
         # The efforts of joints that move unknown links are unknown.
-        received = []
-        node.subscribe("joint_repulsion", pt.JointRepulsion, received.append)
+        received = node.collect("joint_repulsion", pt.JointRepulsion)
         joints.stop()
         node.wait_until(lambda: received and np.isnan(received[-1].effort).all(), "NaN efforts")
         self.assertEqual(received[-1].status, ProximityArray.NO_POSE)
@@ -377,8 +363,7 @@ class JointStatesTest(pt.NodeTest):
             self.world.poses[name] = ("base", X[name])
         self.world.start_tf()
         node.wait_for_status(ProximityArray.OK)
-        received = []
-        node.subscribe("joint_repulsion", pt.JointRepulsion, received.append)
+        received = node.collect("joint_repulsion", pt.JointRepulsion)
         node.wait_until(lambda: received and received[-1].status != ProximityArray.OK, "a reason")
         self.assertEqual(received[-1].status, ProximityArray.NO_POSE)
         self.assertIn("the pose of link 'column' is not known", received[-1].status_text)

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """LaserScan as a source: true distances, malformed scans, silence, and sensors that move."""
 
-import contextlib
 import re
 
 import numpy as np
@@ -23,6 +22,14 @@ def scan(ranges, stamp=None, frame="camera", **members):
     for name, value in members.items():
         setattr(message, name, value)
     return message
+
+
+def scan_along_x(beam, distance, stamp, duration):
+    """101 beams of a sensor that moves meanwhile; one of them goes along x, and meets something."""
+    ranges = np.full(101, np.inf)
+    ranges[beam] = distance
+    timing = {"angle_increment": 0.01, "time_increment": duration / 100}
+    return scan(ranges, stamp, "moving", angle_min=-0.01 * beam, **timing)
 
 
 def endpoints(message):
@@ -60,13 +67,8 @@ class LaserScanTest(pt.NodeTest):
         self.start(sources={"laser": source}, **{"query/tolerance": 0.0})
         self.world.start_tf()
 
-    @contextlib.contextmanager
     def stream(self, make, rate=20):
-        repeater = self.world.repeat(rate, lambda: self.publisher.publish(make()))
-        try:
-            yield repeater
-        finally:
-            repeater.stop()
+        return self.world.repeat(rate, lambda: self.publisher.publish(make()))
 
     def check_wall(self):
         message = scan(wall())
@@ -126,15 +128,7 @@ class LaserScanTest(pt.NodeTest):
             stamp = rospy.Time.now()
             duration = 0.2
             at_point = X_base_moving(stamp.to_sec() + duration)[0, 3]
-            ranges = [float("inf")] * 100 + [point - at_point]  # the last beam, along x
-            return scan(
-                ranges,
-                stamp,
-                "moving",
-                angle_min=-1.0,
-                angle_increment=0.01,
-                time_increment=duration / 100,
-            )
+            return scan_along_x(100, point - at_point, stamp, duration)
 
         with self.stream(make, rate=10):
             self.node.wait_for_status(ProximityArray.OK)
@@ -158,16 +152,7 @@ class LaserScanTest(pt.NodeTest):
         def make():
             stamp = rospy.Time.now()
             at_point = X_base_moving(stamp.to_sec() + 0.5 * duration)[0, 3]
-            ranges = [float("inf")] * 101
-            ranges[50] = point - at_point
-            return scan(
-                ranges,
-                stamp,
-                "moving",
-                angle_min=-0.5,
-                angle_increment=0.01,
-                time_increment=duration / 100,
-            )
+            return scan_along_x(50, point - at_point, stamp, duration)
 
         self.world.poses["moving"] = ("base", X_base_moving)
         with self.stream(make):

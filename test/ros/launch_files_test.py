@@ -15,7 +15,7 @@ import roslaunch.config
 import roslaunch.xmlloader
 import rospy
 import yaml
-from joint_states_test import ARM, JointStatesTest, arm_poses, joint_state
+from joint_states_test import ARM, arm_poses
 from proximity_testing import ProximityArray
 from sensor_msgs.msg import PointCloud2
 
@@ -24,6 +24,9 @@ LAUNCH = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..", "
 
 CONFIG = os.path.join(LAUNCH, "..", "config")
 ROOT = os.path.realpath(os.path.join(LAUNCH, ".."))
+
+
+Q = {"turn": 0.5, "slide": 0.2}
 
 
 def launch_files():
@@ -52,8 +55,10 @@ class Robot:
 
     def __init__(self, namespace, q, points):
         rospy.set_param(namespace + "/robot_description", ARM)
-        self.q, self.points, self.answer = q, points, None
-        self.joints = JointStatesTest.joint_publisher(namespace)
+        self.points, self.answer = points, None
+        self.world = pt.World(namespace, None)
+        self.world.start_joints(q, rate=50)
+        self.stop = self.world.stop
         self.clouds = {
             topic: rospy.Publisher(namespace + "/" + topic, PointCloud2, queue_size=5)
             for topic in points
@@ -61,13 +66,10 @@ class Robot:
         self.subscriber = rospy.Subscriber(
             namespace + "/proximity/proximity", ProximityArray, self.on_answer
         )
-        self.repeaters = [pt.Repeater(50, self.send_joints), pt.Repeater(20, self.send_clouds)]
+        self.world.repeat(20, self.send_clouds)
 
     def on_answer(self, message):
         self.answer = message
-
-    def send_joints(self):
-        self.joints.publish(joint_state(self.q))
 
     def send_clouds(self):
         for topic, points in self.points.items():
@@ -83,25 +85,26 @@ class Robot:
         pt.wait_until(is_ok, "OK")
         return answers[-1]
 
-    def stop(self):
-        for repeater in self.repeaters:
-            repeater.stop()
-
 
 def beside_the_ball(q, distance):
     return pt.apply(arm_poses(**q)["ball_link"], [[0.0, 0.0, pt.BALL_RADIUS + distance]])
 
 
 class LaunchFilesTest(unittest.TestCase):
+    def robot(self, *arguments):
+        robot = Robot(*arguments)
+        self.addCleanup(robot.stop)
+        return robot
+
     def check(self, robot, distance, source):
         one = pt.link(robot.wait_until_ok(), "ball_link")
         self.assertAlmostEqual(one.distance, distance, delta=0.0011)
         self.assertEqual(one.source, source)
 
     def test_two_robots(self):
-        left_q, right_q = {"turn": 0.5, "slide": 0.2}, {"turn": -1.0, "slide": 0.9}
-        left = Robot("/left", left_q, {"cloud": beside_the_ball(left_q, 0.1)})
-        right = Robot("/right", right_q, {"cloud": beside_the_ball(right_q, 0.2)})
+        left_q, right_q = Q, {"turn": -1.0, "slide": 0.9}
+        left = self.robot("/left", left_q, {"cloud": beside_the_ball(left_q, 0.1)})
+        right = self.robot("/right", right_q, {"cloud": beside_the_ball(right_q, 0.2)})
         self.check(left, 0.1, "cloud")
         self.check(right, 0.2, "cloud")
         # One robot's silence is not the other's.
@@ -110,12 +113,10 @@ class LaunchFilesTest(unittest.TestCase):
         self.assertTrue(pt.all_unknown(left.answer))
         right.answer = None
         self.check(right, 0.2, "cloud")
-        right.stop()
 
     def test_two_cameras(self):
-        q = {"turn": 0.5, "slide": 0.2}
-        far, near = beside_the_ball(q, 0.3), beside_the_ball(q, 0.15)
-        robot = Robot("/cameras", q, {"first/points": far, "second/points": near})
+        far, near = beside_the_ball(Q, 0.3), beside_the_ball(Q, 0.15)
+        robot = self.robot("/cameras", Q, {"first/points": far, "second/points": near})
         self.check(robot, 0.15, "second_camera")
         names = [source.name for source in robot.answer.sources]
         self.assertEqual(names, ["first_camera", "second_camera"])
@@ -126,13 +127,10 @@ class LaunchFilesTest(unittest.TestCase):
         robot.points = {"first/points": far}
         pt.wait_until(lambda: robot.answer.status == ProximityArray.STALE_CLOUD, "a stale cloud")
         self.assertIn("second_camera", robot.answer.status_text)
-        robot.stop()
 
     def test_camera_manager(self):
-        q = {"turn": 0.5, "slide": 0.2}
-        robot = Robot("/managed", q, {"camera/points": beside_the_ball(q, 0.1)})
+        robot = self.robot("/managed", Q, {"camera/points": beside_the_ball(Q, 0.1)})
         self.check(robot, 0.1, "cloud")
-        robot.stop()
 
     def check_not_copied(self, topic):
         """The manager hands the topic's messages to itself, by pointer."""
@@ -145,28 +143,24 @@ class LaunchFilesTest(unittest.TestCase):
     def test_filters_of_pcl(self):
         """What a nodelet of pcl_ros drops, here below z = 0.68, is no obstacle; points that it joins are
         one, in their middle."""
-        q = {"turn": 0.5, "slide": 0.2}
-        kept, dropped = beside_the_ball(q, 0.1), beside_the_ball(q, 0.05)
+        kept, dropped = beside_the_ball(Q, 0.1), beside_the_ball(Q, 0.05)
         self.assertLess(dropped[0, 2], 0.68)
-        robot = Robot("/filtered", q, {"camera/points": np.vstack([kept, dropped])})
+        robot = self.robot("/filtered", Q, {"camera/points": np.vstack([kept, dropped])})
         self.check(robot, 0.1, "cloud")
         self.check_not_copied("/filtered/camera/points_filtered")
-        robot.stop()
 
-        ends = np.vstack([beside_the_ball(q, 0.06), beside_the_ball(q, 0.14)])
+        ends = np.vstack([beside_the_ball(Q, 0.06), beside_the_ball(Q, 0.14)])
         self.assertEqual(len(set(map(tuple, np.floor(ends / 0.5)))), 1)  # one voxel
-        robot = Robot("/thinned", q, {"camera/points": ends})
+        robot = self.robot("/thinned", Q, {"camera/points": ends})
         self.check(robot, 0.1, "cloud")
         self.check_not_copied("/thinned/camera/points_filtered")
-        robot.stop()
 
     def test_cell(self):
         """The ball is above the table of config/cell.yaml, the box beyond its back wall; no camera."""
-        robot = Robot("/in_cell", {"turn": 0.0, "slide": 0.2}, {})
+        robot = self.robot("/in_cell", {"turn": 0.0, "slide": 0.2}, {})
         self.check(robot, 0.5 + 0.005 - pt.BALL_RADIUS, "cell")
         # The wall reaches to x = -0.625, the box to -0.8 + 0.05 + 0.1.
         self.assertAlmostEqual(pt.link(robot.answer, "box_link").distance, 0.025, delta=0.0011)
-        robot.stop()
 
     def test_planning_scenes(self):
         """The bridge is started where it is asked for, and its objects are those of the cell."""

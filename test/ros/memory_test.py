@@ -12,17 +12,16 @@ import genpy.dynamic
 import numpy as np
 import proximity_testing as pt
 import rospy
-from geometry_msgs.msg import Point, Pose, Quaternion
-from joint_states_test import joint_state
 from proximity_testing import LinkProximity, ProximityArray
-from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ist_proximity.srv import AttachObject, AttachObjectRequest, DetachObject
+from ist_proximity.srv import AttachObjectRequest, DetachObject
 
 VOXEL = 0.02
 DECAY = 4.0
+LASTING = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
+FADING = dict(LASTING, decay=DECAY)
 BALL = (1.5, 0.6, 0.0)
 # A ball that turns about the camera: its reach is known, and farther points are dropped.
 TURNING_BALL = """<robot name="turning"> <link name="base"/>
@@ -89,8 +88,7 @@ class MemoryTest(pt.NodeTest):
         return ok and self.ball(message).state == LinkProximity.CLEAR
 
     def test_hidden_is_remembered_and_forgotten(self):
-        memory = {"enabled": True, "decay": DECAY, "resolution": VOXEL}
-        self.start(memory=memory)
+        self.start(memory=FADING)
         seen = self.node.wait_for(self.is_from("cloud"), "the far patch in view")
         self.assertAlmostEqual(self.ball(seen).distance, distance_to(FAR), delta=2e-3)
         self.assertEqual([s.name for s in seen.sources], ["cloud", "cloud/memory"])
@@ -125,14 +123,11 @@ class MemoryTest(pt.NodeTest):
         self.world.points = NEAR
         for message in self.node.next_messages(50):
             self.assertTrue(self.is_clear(message), message)
-        self.node.wait_until(
-            lambda: self.node.diagnostic("input cloud/memory", "voxels in memory") not in ("", "0"),
-            "the memory in the diagnostics",
-        )
+        self.node.wait_for_value("input cloud/memory", "voxels in memory", "^[^0]")
 
     def test_saved_read_and_shown(self):
         path = os.path.join(tempfile.mkdtemp(), "memory.bt")
-        memory = {"enabled": True, "decay": float("inf"), "resolution": VOXEL, "file": path}
+        memory = dict(LASTING, decay=float("inf"), file=path)
         self.start(memory=memory)
         maps = []
         subscriber = rospy.Subscriber(
@@ -181,10 +176,7 @@ class MemoryTest(pt.NodeTest):
     # While a pose is unknown, clouds are not remembered. What left the view with the first of them
     # is an obstacle all the same.
     def test_hidden_while_a_pose_is_unknown(self):
-        self.start(
-            memory={"enabled": True, "decay": 1000.0, "resolution": VOXEL},
-            self_filter_links="all",
-        )
+        self.start(memory=LASTING, self_filter_links="all")
         self.node.wait_for(self.is_from("cloud"), "the far patch in view")
         self.remember(10)
         del self.world.poses["box_link"]
@@ -197,22 +189,14 @@ class MemoryTest(pt.NodeTest):
             self.assertAlmostEqual(self.ball(message).distance, distance_to(FAR), delta=2 * VOXEL)
 
     def attach_box(self, size, middle, angle=0.0):
-        """Attaches a box to the ball, turned about z."""
-        attach = self.node.service("attach_object", AttachObject)
-        pose = Pose(Point(*middle), Quaternion(z=np.sin(angle / 2), w=np.cos(angle / 2)))
-        box = AttachObjectRequest(name="box", link="ball_link", shape=AttachObjectRequest.BOX)
-        box.dimensions, box.pose = size, pose
-        answer = attach(box)
-        self.assertTrue(answer.success, answer.message)
+        self.node.attach("ball_link", middle, size, AttachObjectRequest.BOX, "box", angle)
 
     # The robot reaches farther with an object than where it was remembered what is there.
     def test_what_was_beyond_reach_is_not_known_within_it(self):
         far, turn = patch(1.9, 0.12), 0.5
-        publisher = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
-        self.world.repeat(100, lambda: publisher.publish(joint_state({"turn": turn})))
+        self.world.start_joints({"turn": turn})
         self.world.points = far
-        memory = {"enabled": True, "decay": DECAY, "resolution": VOXEL}
-        self.start(urdf_text=TURNING_BALL, memory=memory, pose_source="joint_states")
+        self.start(urdf_text=TURNING_BALL, memory=FADING, pose_source="joint_states")
         self.node.wait_for(self.is_clear, "the far patch out of reach")
         self.remember(10)
         self.world.points = patch(5.0, 0.12) * [-1, 1, 1]  # the camera turns to the wall behind it
@@ -233,8 +217,7 @@ class MemoryTest(pt.NodeTest):
     def test_its_frame_is_lost(self):
         in_odom = ("odom", pt.transform((3.0, 0.0, 0.0)))
         self.world.poses["base"] = in_odom
-        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
-        self.start(memory=memory, fixed_frame="odom")
+        self.start(memory=LASTING, fixed_frame="odom")
         self.node.wait_for(self.is_from("cloud"), "the far patch in view")
         self.world.points = NEAR
         self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered")
@@ -263,8 +246,7 @@ class MemoryTest(pt.NodeTest):
         self.world.points = patch(2.4, 0.72, 0.015)
         middle, side = (1.0, 0.0, 0.0), (1.0, 0.12, 0.0)
         self.world.stand(pt.transform(middle), pt.transform((0, 0, 5)))
-        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
-        self.start(memory=memory, unknown_space=unknown_space, max_distance=2.0)
+        self.start(memory=LASTING, unknown_space=unknown_space, max_distance=2.0)
         is_in_middle = lambda m: (  # noqa: E731
             self.is_from("cloud")(m)
             and self.ball(m).unseen_distance > 0.17
@@ -301,8 +283,7 @@ class MemoryTest(pt.NodeTest):
     def test_what_the_robot_lets_go_of_is_not_known(self):
         self.world.points = patch(2.4, 0.72, 0.015)
         self.world.stand(pt.transform((1.0, 0.15, 0.0)), pt.transform((0, 0, 5)))
-        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
-        self.start(memory=memory, unknown_space="obstacle", max_distance=2.0)
+        self.start(memory=LASTING, unknown_space="obstacle", max_distance=2.0)
         # From the side of the cone of half width 0.3 x on, where the camera does not look.
         to_side = (0.3 - 0.15) / np.hypot(1.0, 0.3) - pt.BALL_RADIUS
         near_side = lambda m: (  # noqa: E731
@@ -326,19 +307,18 @@ class MemoryTest(pt.NodeTest):
     # What a joint may have moved since its last sample comes off the distance from unseen space, too.
     def test_unknown_space_beside_a_joint_that_is_late(self):
         place = lambda t: abs(t % 1.2 - 0.6) - 0.3  # 1 m/s to and fro
-        joints = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
+        joints = rospy.Publisher(self.namespace + "/joint_states", pt.JointState, queue_size=10)
         stated = set()
 
         def send_slide():
             stamp = rospy.Time.now()
             stated.add(stamp)
-            joints.publish(joint_state({"slide": place(stamp.to_sec())}, stamp))
+            joints.publish(pt.joint_state({"slide": place(stamp.to_sec())}, stamp))
 
         self.world.points = patch(2.4, 0.72, 0.015)
         self.world.repeat(10, send_slide)
-        self.world.repeat(100, lambda: joints.publish(joint_state({"grip": 0.0})))
-        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
-        parameters = {"pose_source": "joint_states", "unknown_space": "obstacle", "memory": memory}
+        self.world.start_joints({"grip": 0.0})
+        parameters = {"pose_source": "joint_states", "unknown_space": "obstacle", "memory": LASTING}
         parameters.update({"max_distance": 2.0, "links": ["ball_link"]})
         self.node = pt.ProximityNode(self.namespace, parameters, SLIDING_BALL)
         is_seen = lambda m: m.links and self.ball(m).unseen_distance > 0.1  # noqa: E731
@@ -367,9 +347,8 @@ class MemoryTest(pt.NodeTest):
             self.world.poses = dict(links, base=("odom", pt.transform((3.0, y, 0.0), angle=0.0)))
 
         drive(-1.0)
-        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
         self.start(
-            memory=memory,
+            memory=LASTING,
             fixed_frame="odom",
             unknown_space="obstacle",
             max_distance=2.0,

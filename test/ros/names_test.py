@@ -35,14 +35,13 @@ class NamesTest(pt.NodeTest):
         for pose_source in ("tf", "joint_states"):
             with self.subTest(pose_source):
                 parameters = {"pose_source": pose_source}
-                self.start(urdf, **parameters)
-                spheres = []
-                self.nodes[-1].subscribe("spheres", MarkerArray, spheres.append)
-                message = self.nodes[-1].wait_for_status(ProximityArray.OK)
+                node = self.start(urdf, **parameters)
+                spheres = node.collect("spheres", MarkerArray)
+                message = node.wait_for_status(ProximityArray.OK)
                 self.assertEqual([one.link for one in message.links], ["/ball_link", "box/link"])
                 self.assertEqual(message.header.frame_id, "base")
                 self.assertAlmostEqual(pt.link(message, "/ball_link").distance, 0.2, 5)
-                self.nodes[-1].wait_until(lambda spheres=spheres: spheres, "~spheres")
+                node.wait_until(lambda spheres=spheres: spheres, "~spheres")
                 frames = {marker.header.frame_id for marker in spheres[-1].markers}
                 self.assertEqual(frames, {"ball_link", "box/link"})
                 self.finish(self.nodes.pop())

@@ -31,10 +31,7 @@ class NoiseFilterTest(pt.NodeTest):
         self.world.points = np.vstack([LONE, PATCH, nan, [[0.0, 0.0, 1e6]]])
         self.start(**parameters)
         self.check(0.4, len(PATCH))
-        self.node.wait_until(
-            lambda: self.node.diagnostic("input cloud", "points taken for noise") == "1",
-            "the count",
-        )
+        self.node.wait_for_value("input cloud", "points taken for noise", "^1$")
         # Points with enough neighbors are no noise.
         self.world.points = LONE + 0.002 * np.arange(5)[:, None]
         message = self.node.wait_for(lambda m: m.sources[0].points_used == 5, "five points")

@@ -15,14 +15,12 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
-from geometry_msgs.msg import Point, Pose, Quaternion
-from memory_test import BALL, FAR, NEAR, VOXEL, distance_to
+from memory_test import BALL, FAR, LASTING, NEAR, distance_to
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
 
 from ist_proximity.msg import SpeedScaleState
-from ist_proximity.srv import AttachObject, AttachObjectRequest
 
 TIMEOUT = 0.4  # [s] of a camera
 # With a model that has just been made anew, no cloud has come.
@@ -46,7 +44,7 @@ def merged(one, other):
     return result
 
 
-MEMORY = {"memory": {"enabled": True, "decay": 1000.0, "resolution": VOXEL}}
+MEMORY = {"memory": LASTING}
 OPTIONS = {
     "memory": MEMORY,
     "unknown_space": dict(MEMORY, unknown_space="obstacle"),
@@ -100,15 +98,14 @@ class OptionsNode:
         self.last_cloud = 0.0
         self.world.start_tf(25)
         self.clouds = self.world.repeat(8, self.send_cloud)
-        self.scales, self.smallest = [], []
         parameters = {"sources": {"camera": camera()}, "max_distance": 0.8, "rate": 10}
         parameters["speed_scale"] = {"enabled": True}
         for option in options:
             parameters = merged(parameters, OPTIONS[option])
         rospy.set_param(self.namespace + "/other_description", OTHER)
         self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf(), diagnostics=False)
-        self.node.subscribe("speed_scale_state", SpeedScaleState, self.scales.append)
-        self.node.subscribe("min_distance", Float64, lambda m: self.smallest.append(m.data))
+        self.scales = self.node.collect("speed_scale_state", SpeedScaleState)
+        self.smallest = self.node.collect("min_distance", Float64, lambda m: m.data)
 
     def send_cloud(self):
         message = pt.cloud(self.world.points)
@@ -116,13 +113,8 @@ class OptionsNode:
         self.world.cloud_publisher.publish(message)
 
     def attach(self):
-        if "attached" not in self.options:
-            return
-        proxy = self.node.service("attach_object", AttachObject)
-        pose = Pose(Point(0.0, 0.0, 0.3), Quaternion(w=1.0))
-        shape = AttachObjectRequest.SPHERE
-        answer = proxy(name="tool", link="ball_link", pose=pose, shape=shape, dimensions=[0.02])
-        assert answer.success, answer.message
+        if "attached" in self.options:
+            self.node.attach("ball_link", (0.0, 0.0, 0.3), [0.02])
 
     def is_alive(self, message):
         """Whether the camera is used: OK, but for links that the deadline leaves."""
@@ -243,7 +235,7 @@ class OptionalCamerasTest(pt.NodeTest):
         self.front_clouds = self.world.start_clouds()
         # Behind the camera: seen, and near to nothing.
         self.side_clouds = self.world.repeat(20, lambda: self.side.publish(pt.cloud([[-1.0, 0, 0]])))
-        memory = {"enabled": True, "decay": self.DECAY, "resolution": VOXEL}
+        memory = dict(LASTING, decay=self.DECAY)
         sources = {
             "front": camera(required=False, memory=memory),
             "side": camera(topic="side", required=False),

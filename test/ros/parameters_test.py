@@ -283,17 +283,20 @@ class ParametersTest(unittest.TestCase):
         self.assertEqual(log.count("no effect"), 3, log)
         self.assertEqual(node.stop(), 0)
 
+    def check_valid(self, namespace, parameters):
+        node = pt.ProximityNode(namespace, parameters, pt.urdf())
+        message = node.wait_for(lambda m: m.links, "the model")
+        self.assertNotIn("unknown parameter", node.log())
+        self.assertEqual(node.stop(), 0)
+        return message
+
     def test_config_files(self):
         """The package's files are valid and hold no unknown names."""
         folder = os.path.join(os.path.dirname(__file__), "..", "..", "config")
         for name in ("proximity.yaml", "demo.yaml", "camera_and_laser.yaml"):
             with self.subTest(name):
                 parameters = rosparam.load_file(os.path.join(folder, name))[0][0]
-                namespace = "/file_" + name.split(".")[0]
-                node = pt.ProximityNode(namespace, parameters, pt.urdf())
-                node.wait_for(lambda m: m.links, "the model")
-                self.assertNotIn("unknown parameter", node.log())
-                self.assertEqual(node.stop(), 0)
+                self.check_valid("/file_" + name.split(".")[0], parameters)
 
     def test_example_of_sources(self):
         """The example of sources in config/proximity.yaml is valid."""
@@ -302,11 +305,8 @@ class ParametersTest(unittest.TestCase):
             text = f.read()
         commented = text[text.index("# sources:") :].splitlines()
         parameters = yaml.safe_load("\n".join(line[2:] for line in commented))
-        node = pt.ProximityNode("/example", parameters, pt.urdf())
-        message = node.wait_for(lambda m: m.links, "the model")
+        message = self.check_valid("/example", parameters)
         self.assertEqual({s.name for s in message.sources}, set(parameters["sources"]))
-        self.assertNotIn("unknown parameter", node.log())
-        self.assertEqual(node.stop(), 0)
 
 
 if __name__ == "__main__":

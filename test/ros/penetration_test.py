@@ -87,10 +87,7 @@ class PenetrationTest(pt.NodeTest):
         self.assertGreater(forces[-1], 0.0)
         self.assertLess(np.abs(np.diff(forces)).max(), 0.35 * max(forces))
 
-        node.wait_until(
-            lambda: node.diagnostic("model", "contact volumes") == "ready",
-            "the volumes in the diagnostics",
-        )
+        node.wait_for_value("model", "contact volumes", "^ready$")
 
     def test_volumes_and_finer_spheres_come_on_first_need(self):
         """Nothing is near: coarse spheres and no volume. Then the box comes near, not in contact."""
@@ -98,17 +95,11 @@ class PenetrationTest(pt.NodeTest):
         # A machine that stops for a while makes nothing stale.
         node = self.start(cloud_timeout=8.0, pose_timeout=8.0)
         node.wait_for_status(ProximityArray.OK)
-        node.wait_until(
-            lambda: node.diagnostic("model", "links with a volume").startswith("0 of 2"),
-            "no volumes without need",
-        )
+        node.wait_for_value("model", "links with a volume", "^0 of 2")
         self.assertTrue(node.diagnostic("model", "box_link").startswith("coarse, "))
         count = len(node.messages)
         self.move(-0.1)
-        node.wait_until(
-            lambda: node.diagnostic("model", "links with a volume").startswith("1 of 2"),
-            "the volume of the link that is near",
-        )
+        node.wait_for_value("model", "links with a volume", "^1 of 2")
         self.assertTrue(node.diagnostic("model", "box_link").startswith("final, "))
         for message in node.messages[count:]:  # the swap loses nothing
             self.assertEqual(message.status, ProximityArray.OK, message.status_text)
@@ -136,15 +127,8 @@ class PenetrationTest(pt.NodeTest):
             rospy.set_param(self.namespace + "/robot_description", pt.urdf(boxes(count, edge)))
             self.assertTrue(node.reload().success)
             # Some volumes are there, and others are not.
-            node.wait_until(
-                lambda: node.diagnostic("model", "links with a volume").endswith(
-                    "of %d" % (count + 2)
-                ),
-                "the new links",
-            )
-        node.wait_until(
-            lambda: node.diagnostic("model", "links with a volume") == "14 of 14", "all volumes"
-        )
+            node.wait_for_value("model", "links with a volume", "of %d$" % (count + 2))
+        node.wait_for_value("model", "links with a volume", "^14 of 14$")
         for i in range(12):
             said = node.diagnostic("model", "volume of part%d" % i)
             self.assertGreater(float(said.split(", ")[1].split()[0]), 60.0, said)  # of 125 litres
@@ -154,10 +138,7 @@ class PenetrationTest(pt.NodeTest):
         self.assertFalse(wrench(self.move(-0.05)).any())
         message = self.move(0.03, known=False)
         self.assertTrue(np.isnan(wrench(message)).all())
-        node.wait_until(
-            lambda: "penetration/enabled" in node.diagnostic("model", "contact volumes"),
-            "why, in the diagnostics",
-        )
+        node.wait_for_value("model", "contact volumes", "penetration/enabled")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,9 @@
 #!/usr/bin/env python3
 """moveit_msgs/PlanningScene as a known world: of Noetic and of Melodic, as genpy writes them."""
 
-import atexit
 import itertools
 import math
 import struct
-import subprocess
 import tempfile
 import unittest
 
@@ -13,7 +11,7 @@ import proximity_testing as pt
 import rospy
 from geometry_msgs.msg import Pose
 from planning_scene_messages import get_planning_scene_type, planning_scene_types
-from proximity_testing import LinkProximity, ProximityArray
+from proximity_testing import ProximityArray
 
 ADD, REMOVE, APPEND, MOVE = range(4)
 # A binary OcTree with one occupied leaf, which begins at (0, 0, 0): 16 levels of inner nodes above it.
@@ -37,18 +35,11 @@ class Bridge:
     numbers = itertools.count()
 
     def __init__(self, namespace, scenes, objects, *arguments):
-        command = [
-            pt.find_program("ist_proximity", "planning_scene_bridge"),
-            "__ns:=" + namespace,
-            "__name:=bridge_%d_of_%s" % (next(self.numbers), objects),
-            "planning_scene:=" + scenes,
-            "world_objects:=" + objects,
-            "/tf:=" + namespace + "/tf",
-            "/tf_static:=" + namespace + "/tf_static",
-        ]
+        command = [pt.find_program("ist_proximity", "planning_scene_bridge"), *arguments]
+        command += ["planning_scene:=" + scenes, "world_objects:=" + objects]
+        name = "bridge_%d_of_%s" % (next(self.numbers), objects)
         self.log = tempfile.TemporaryFile()
-        self.process = subprocess.Popen(command + list(arguments), stdout=self.log, stderr=subprocess.STDOUT)
-        atexit.register(self.process.kill)
+        self.process = pt.start_program(command, namespace, name, self.log)
 
     def stop(self):
         self.process.terminate()
@@ -177,6 +168,10 @@ class PlanningSceneTest(unittest.TestCase):
         cls.node.stop()
         cls.world.stop()
 
+    def tearDown(self):
+        self.noetic.send(is_diff=False)
+        self.at_post()
+
     def distance(self, expected, what, source=None):
         ball = pt.link(self.node.wait_for_distance(expected, what, source=source), "ball_link")
         self.assertLessEqual(ball.lower_bound, ball.distance)
@@ -219,8 +214,6 @@ class PlanningSceneTest(unittest.TestCase):
         self.node.wait_for_status(ProximityArray.NO_CLOUD, "'pair'")
         self.noetic.send(box)
         self.distance(0.25, "the object that was sent anew")
-        self.noetic.send(is_diff=False)
-        self.at_post()
 
     def test_3_allowed_collisions(self):
         self.noetic.send(self.noetic.box("table", (0, 0.25, 0)))
@@ -233,14 +226,11 @@ class PlanningSceneTest(unittest.TestCase):
         self.distance(0.2, "the wall", "noetic")
         self.noetic.send(allowed=["box_link", "table"])
         self.distance(0.1, "the table, which may not be touched any more", "noetic")
-        self.noetic.send(is_diff=False)
-        self.at_post()
 
     def test_4_what_cannot_be_used_is_named(self):
         bad = self.noetic.box("bad", (0, 0.5, 0), edge=math.nan)
         self.noetic.send(self.noetic.box("good", (0, 0.35, 0)), bad)
-        told = self.node.wait_for_status(ProximityArray.NO_CLOUD, "'bad'")
-        self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+        self.node.wait_for_unknown(ProximityArray.NO_CLOUD, "'bad'")
         self.noetic.send(self.noetic.box("bad", None, REMOVE))
         self.distance(0.15, "the good one, without the bad one")
         # A description that cannot be used after one of the same name that can.
@@ -254,19 +244,14 @@ class PlanningSceneTest(unittest.TestCase):
         # Names are no keys of other faults.
         self.noetic.send(bad, self.noetic.box("nowhere", (0, 3, 0), frame="no_such_frame"))
         self.node.wait_for_status(ProximityArray.NO_CLOUD, "'bad'")
-        self.noetic.send(is_diff=False)
-        self.at_post()
 
     def test_5_a_difference_that_is_lost_needs_a_full_scene(self):
         self.noetic.send(*[self.noetic.box("object %d" % i, (0, 3, 0)) for i in range(10001)])
         self.node.wait_for_status(ProximityArray.NO_CLOUD, "10001 objects; allowed are 10000")
         self.noetic.send(self.noetic.box("(full scene)", (0, 3, 0)))
-        told = self.node.wait_for_status(ProximityArray.NO_CLOUD, "a full scene")
-        self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+        self.node.wait_for_unknown(ProximityArray.NO_CLOUD, "a full scene")
         self.noetic.send(self.noetic.box("part", (0, 0.35, 0)), is_diff=False)
         self.distance(0.15, "the part of the full scene")
-        self.noetic.send(is_diff=False)
-        self.at_post()
 
     def test_5b_the_octomap_is_an_obstacle(self):
         for publisher, source in ((self.noetic, "noetic"), (self.melodic, "melodic")):
@@ -301,12 +286,9 @@ class PlanningSceneTest(unittest.TestCase):
             (octomap((0, 0, 0), frame="no_such_frame"), "no_such_frame"),
         ):
             self.noetic.send(octomap=bad)
-            message = self.node.wait_for_status(ProximityArray.NO_CLOUD, told)
-            self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.UNKNOWN)
+            self.node.wait_for_unknown(ProximityArray.NO_CLOUD, told)
             self.noetic.send(octomap=octomap((-0.1, 0.25, -0.1)))
             self.distance(0.15, "the octomap that was sent anew", "noetic")
-        self.noetic.send(is_diff=False)
-        self.at_post()
 
     def test_6_only_differences(self):
         # Only differences: a source of its own would do the same after a restart of the node.
@@ -329,8 +311,7 @@ class PlanningSceneTest(unittest.TestCase):
             late.stop()
             late.start()
             late.send(late.box("other", (0, 0, 0.9)))
-            told = node.wait_for_status(ProximityArray.NO_CLOUD, "has another publisher than before")
-            self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+            node.wait_for_unknown(ProximityArray.NO_CLOUD, "has another publisher than before")
             service, requests = late.serve("/late/get_planning_scene", late.box("part", (0, 0.35, 0)))
             node.wait_for_distance(0.15, "the part of the service's scene")
             self.assertEqual(set(requests), {4 | 16 | 32 | 64 | 128})
@@ -362,8 +343,7 @@ class PlanningSceneTest(unittest.TestCase):
             message = Malformed()
             message._buff = b"\xff" * size
             publisher.publish(message)
-        told = self.node.wait_for_status(ProximityArray.NO_CLOUD, "no planning scene that can be read")
-        self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+        self.node.wait_for_unknown(ProximityArray.NO_CLOUD, "no planning scene that can be read")
         self.node.wait_for_status(ProximityArray.NO_CLOUD, "a full scene")
         self.noetic.send(is_diff=False)
         self.at_post()
@@ -381,8 +361,6 @@ class PlanningSceneTest(unittest.TestCase):
         # The next one begins with what is latched.
         self.bridges[0] = Bridge("/scenes", "monitored_planning_scene", "objects")
         self.distance(0.15, "the part, from the next bridge", "noetic")
-        self.noetic.send(is_diff=False)
-        self.at_post()
 
 
 if __name__ == "__main__":

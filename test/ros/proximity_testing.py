@@ -5,6 +5,7 @@ Nothing here sleeps and hopes: tests wait for a condition, with a timeout that a
 """
 
 import atexit
+import re
 import shutil
 import signal
 import subprocess
@@ -18,12 +19,13 @@ import genpy.dynamic
 import numpy as np
 import roslib.packages
 import rospy
-from geometry_msgs.msg import TransformStamped
-from sensor_msgs.msg import PointCloud2, PointField
+from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped
+from sensor_msgs.msg import JointState, PointCloud2, PointField
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 from ist_proximity.msg import JointRepulsion, LinkProximity, ProximityArray
+from ist_proximity.srv import AttachObject, AttachObjectRequest
 
 TIMEOUT = 30.0  # [s] for anything to happen
 
@@ -130,8 +132,15 @@ def transform_message(parent, child, X, stamp):
     return message
 
 
+def joint_state(positions, stamp=None, velocities=()):
+    message = JointState(name=list(positions), position=list(positions.values()))
+    message.velocity = list(velocities)
+    message.header.stamp = rospy.Time.now() if stamp is None else stamp
+    return message
+
+
 class Repeater:
-    """Calls a function at a rate, in a thread, until stopped or paused."""
+    """Calls a function at a rate, in a thread, until stopped or paused: in a `with`, at its end."""
 
     def __init__(self, rate, function):
         self._period, self.function = 1.0 / rate, function
@@ -139,6 +148,12 @@ class Repeater:
         self.paused = False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
 
     def _run(self):
         while not self._stop.wait(self._period):
@@ -177,8 +192,8 @@ class World:
         self.poses = {"ball_link": ("base", ball), "box_link": ("base", box)}
         return self
 
-    def send_tf(self):
-        stamp = rospy.Time.now()
+    def send_tf(self, late=0.0):
+        stamp = rospy.Time.now() - rospy.Duration(late)
         messages = [
             transform_message(parent, child, X(stamp.to_sec()) if callable(X) else X, stamp)
             for child, (parent, X) in dict(self.poses).items()
@@ -206,6 +221,14 @@ class World:
         """Clouds of points, or of those that a function gives."""
         points_of = points if callable(points) else lambda: points
         return self.repeat(rate, lambda: self.cloud_publisher.publish(cloud(points_of(), frame)))
+
+    def start_joints(self, positions, rate=100, velocities=()):
+        """Joint states of positions, or of those that a function gives; both arguments may change."""
+        publisher = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=100)
+        positions_of = positions if callable(positions) else lambda: positions
+        return self.repeat(
+            rate, lambda: publisher.publish(joint_state(positions_of(), velocities=velocities))
+        )
 
     def repeat(self, rate, function):
         self._repeaters.append(Repeater(rate, function))
@@ -266,6 +289,17 @@ def find_program(package, name):
     return roslib.packages.find_node(package, name)[0]
 
 
+def start_program(command, namespace, name, log, **options):
+    """Starts a node of this name with the tf of the namespace; it ends with the test at the latest."""
+    remappings = ["__ns:=" + namespace, "__name:=" + name]
+    remappings += ["/%s:=%s/%s" % (topic, namespace, topic) for topic in ("tf", "tf_static")]
+    process = subprocess.Popen(
+        [*command, *remappings], stdout=log, stderr=subprocess.STDOUT, **options
+    )
+    atexit.register(process.kill)
+    return process
+
+
 _classes = {}
 _classes_lock = threading.Lock()
 
@@ -312,25 +346,25 @@ class ProximityNode:
             )
         command = self.command or [find_program("ist_proximity", "proximity_node")]
         self._log = tempfile.TemporaryFile()
-        self.process = subprocess.Popen(
-            command
-            + [
-                "__ns:=" + namespace,
-                "__name:=proximity",
-                "/tf:=" + namespace + "/tf",
-                "/tf_static:=" + namespace + "/tf_static",
-            ],
-            stdout=self._log,
-            stderr=subprocess.STDOUT,
+        self.process = start_program(
+            command,
+            namespace,
+            "proximity",
+            self._log,
             preexec_fn=preexec_fn,
             restore_signals=preexec_fn is None,
         )
-        atexit.register(self.process.kill)  # no process stays when a test fails
 
     def subscribe(self, topic, kind, callback):
         subscriber = rospy.Subscriber(self.name + "/" + topic, kind, callback, queue_size=200)
         self._subscribers.append(subscriber)
         return subscriber
+
+    def collect(self, topic, kind, of=lambda message: message):
+        """A list that grows by what a function makes of each message of a topic."""
+        collected = []
+        self.subscribe(topic, kind, lambda message: collected.append(of(message)))
+        return collected
 
     def _on_message(self, message):
         with self._condition:
@@ -401,6 +435,11 @@ class ProximityNode:
             return default
         return {v.key: v.value for v in self.diagnostics[status].values}.get(key, default)
 
+    def wait_for_value(self, status, key, pattern):
+        """Waits until a value of the diagnostics matches."""
+        what = "'%s' in '%s' of the diagnostics of %s" % (pattern, key, status)
+        self.wait_until(lambda: re.search(pattern, self.diagnostic(status, key)), what)
+
     def wait_until(self, condition, what, timeout=TIMEOUT):
         """Waits for a condition on anything but a ProximityArray."""
         wait_until(condition, what, timeout, self._condition)
@@ -418,6 +457,12 @@ class ProximityNode:
         service = rospy.ServiceProxy(self.name + "/" + name, kind)
         service.wait_for_service(TIMEOUT)
         return service
+
+    def attach(self, link, at, dimensions, shape=AttachObjectRequest.SPHERE, name="tool", angle=0.0):
+        """Attaches an object that is turned about z; it has to succeed."""
+        pose = Pose(Point(*at), Quaternion(z=np.sin(angle / 2), w=np.cos(angle / 2)))
+        answer = self.service("attach_object", AttachObject)(name, link, shape, dimensions, "", pose)
+        assert answer.success, answer.message
 
     def reload(self):
         return self.service("reload_model", Trigger)()
@@ -460,6 +505,19 @@ def wait_until(condition, what, timeout=TIMEOUT, lock=None):
         else:
             with lock:
                 lock.wait(0.05)
+
+
+def first_of(messages, condition, what, begin=None, timeout=TIMEOUT):
+    """Waits for the first of the messages in a growing list, from now or `begin` on, with a condition."""
+    i = len(messages) if begin is None else begin
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        while i < len(messages):
+            if condition(messages[i]):
+                return messages[i]
+            i += 1
+        time.sleep(0.005)
+    raise AssertionError("waited in vain for %s; the last is %s" % (what, messages[-1:]))
 
 
 def link(message, name):

@@ -24,7 +24,9 @@ class ReconfigureTest(pt.NodeTest):
         self.node.wait_for_status(ProximityArray.OK)
 
     def client(self, group):
-        return Client(self.node.name + "/" + group, timeout=30)
+        client = Client(self.node.name + "/" + group, timeout=30)
+        pt.wait_until(client.get_configuration, "~%s/parameter_updates" % group)
+        return client
 
     def ball(self, words, check):
         return self.node.wait_for(lambda m: check(pt.link(m, "ball_link")), words)
@@ -32,7 +34,6 @@ class ReconfigureTest(pt.NodeTest):
     def test_groups(self):
         query, repulsion = self.client("query"), self.client("repulsion")
         # The values are those set at the start, and the defaults.
-        pt.wait_until(lambda: query.get_configuration(), "~query/parameter_updates")
         self.assertAlmostEqual(query.get_configuration()["margin"], 0.02)
         self.assertAlmostEqual(query.get_configuration()["tolerance"], 0.001)
         described = {d["name"]: d for d in query.get_parameter_descriptions(timeout=30)}
@@ -117,7 +118,6 @@ class ReconfigureTest(pt.NodeTest):
     def test_refusals(self):
         """A request takes effect entirely or not at all, and the response holds the values in use."""
         query = self.client("query")
-        pt.wait_until(lambda: query.get_configuration(), "~query/parameter_updates")
         service = query._set_service  # the client itself would leave these out
         for name, value in (
             ("tolerance", -1.0),
@@ -138,8 +138,7 @@ class ReconfigureTest(pt.NodeTest):
 
     def test_speed_scale(self):
         """Distances change at once; values that do not go together change nothing."""
-        scales = []
-        self.node.subscribe("speed_scale", Float64, lambda m: scales.append(m.data))
+        scales = self.node.collect("speed_scale", Float64, lambda m: m.data)
         # The bound is 0.2 m less the margin and the tolerance, between 0.1 and 0.3 m.
         self.node.wait_until(lambda: scales and abs(scales[-1] - 0.4) < 0.01, "a scale of 0.4")
         group = self.client("speed_scale")
@@ -182,9 +181,7 @@ class ReconfigureTest(pt.NodeTest):
         """What was configured stays until something valid replaces it, and the loss is told."""
         name = self.node.name + "/query"
         # Nothing that has never been there is missed.
-        self.node.wait_until(
-            lambda: self.node.diagnostic("query", "live parameters") == "as on the server", "no problem"
-        )
+        self.node.wait_for_value("query", "live parameters", "^as on the server$")
         rospy.delete_param(name + "/margin")
         self.margin_stays("no longer on the parameter server: ~query/margin (0.02 m)", 0.02)
         rospy.set_param(name, "x")  # in place of all names below
@@ -204,7 +201,6 @@ class ReconfigureTest(pt.NodeTest):
     def test_unknown_names(self):
         """A request that names anything but the group's parameters fails and writes nothing."""
         query = self.client("query")
-        pt.wait_until(lambda: query.get_configuration(), "~query/parameter_updates")
         before = rospy.get_param(self.node.name)
         wrong = [
             Config(doubles=[DoubleParameter("margin", 0.07), DoubleParameter(name, 0.0)])

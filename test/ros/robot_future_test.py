@@ -5,7 +5,8 @@
 import numpy as np
 import proximity_testing as pt
 from ist_proximity.msg import SpeedScaleState
-from joint_states_test import ARM, JointStatesTest, joint_state
+from joint_states_test import ARM
+from memory_test import LASTING, VOXEL
 from proximity_testing import LinkProximity, ProximityArray
 
 # The arm with its camera at the column, which looks along x of `base`.
@@ -16,28 +17,15 @@ STILL_CAMERA = ARM.replace(
 # The arm whose joints all have a limit of speed.
 LIMITED = ARM.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><limit velocity="0.8" effort="1"/>')
 
-VOXEL = 0.02
-
 
 class RobotFutureTest(pt.NodeTest):
     CAMERA = BOX = None  # the arm's URDF has the camera
     MAX_DISTANCE = 2.0
 
-    def setUp(self):
-        super().setUp()
-        self.publisher = JointStatesTest.joint_publisher(self.namespace)
-        self.scales = []
-
     def start(self, urdf=ARM, **parameters):
         super().start(urdf, pose_source="joint_states", **parameters)
-        self.node.subscribe("speed_scale_state", SpeedScaleState, self.scales.append)
+        self.scales = self.node.collect("speed_scale_state", SpeedScaleState)
         return self.node
-
-    def send_joints(self, q, velocities=()):
-        """Publishes what the arguments hold, which may change."""
-        self.world.repeat(
-            100, lambda: self.publisher.publish(joint_state(q, velocities=velocities))
-        )
 
     def test_comes_off_the_bounds(self):
         """What links can still sweep comes off their bounds; without velocities it is not known."""
@@ -45,7 +33,7 @@ class RobotFutureTest(pt.NodeTest):
         node = self.start(max_distance=3.0, joint_deceleration=deceleration)
         self.world.start_points([[0.6, 0.6, 0.6]])
         q, velocities = {"turn": 0.3, "slide": 0.5}, [-0.4, 0.6]
-        self.send_joints(q, velocities)
+        self.world.start_joints(q, velocities=velocities)
         message = node.wait_for_status(ProximityArray.OK)
         turned, slid = 0.4**2 / (2 * 0.5), 0.6**2 / (2 * 2.0)  # [rad, m]
         lever = {  # [m] of the farthest point of the link's box from the column's axis
@@ -101,10 +89,10 @@ class RobotFutureTest(pt.NodeTest):
             max_distance=2.0,
             joint_deceleration=deceleration,
             unknown_space="obstacle",
-            memory={"enabled": True, "decay": 1000.0, "resolution": VOXEL},
+            memory=LASTING,
         )
         q, velocities = {"turn": 0.0, "slide": 0.9}, [-0.3, 0.4]
-        self.send_joints(q, velocities)
+        self.world.start_joints(q, velocities=velocities)
         turned, slid = 0.3**2 / (2 * 0.5), 0.4**2 / (2 * 2.0)  # [rad, m]
 
         def is_at(turn, slide):
@@ -138,7 +126,7 @@ class RobotFutureTest(pt.NodeTest):
         )
         away = 0.5 + 0.1 + 1.2  # from the column's axis, by where the ball is
         self.world.start_points([[away * np.cos(turn), away * np.sin(turn), 0.5]])
-        self.send_joints({"turn": turn, "slide": 0.5}, [0.0, 0.0])
+        self.world.start_joints({"turn": turn, "slide": 0.5}, velocities=[0.0, 0.0])
         node.wait_for_status(ProximityArray.OK)
         lever = np.hypot(0.5 + 0.1, 0.1)
         speed = lever * 0.8 + 1.0

@@ -7,6 +7,8 @@ obstacle that is where the ball has come to.
 """
 
 
+import re
+
 import numpy as np
 import proximity_testing as pt
 import rospy
@@ -167,17 +169,13 @@ class SelfFilterTest(pt.NodeTest):
             self.assertEqual(pt.link(message, "hull").state, LinkProximity.CONTACT)
             self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.05, 3)
             self.assertEqual(self.node.log().count(around), 1)
-            self.node.wait_until(
-                lambda: around in (self.node.diagnostic("model", "warning") or ""), "the warning"
-            )
+            self.node.wait_for_value("model", "warning", re.escape(around))
             self.assertEqual(self.node.stop(), 0)
         with self.subTest("off in the SRDF"):
             message = self.check_filter("off", 2, srdf % "hull", **{"self_collision/enabled": True})
             self.assertEqual([one.link for one in message.links], ["ball_link", "tool"])
             self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.05, 3)
-            self.node.wait_until(
-                lambda: around in (self.node.diagnostic("model", "links left out") or ""), "the hull"
-            )
+            self.node.wait_for_value("model", "links left out", re.escape(around))
             told = "<disable_colisions> (line 1)"
             self.assertEqual(self.node.log().count(told), 1)
             self.assertIn(told, self.node.diagnostic("model", "warning"))

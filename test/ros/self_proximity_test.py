@@ -1,19 +1,17 @@
 #!/usr/bin/env python3
 """~self_proximity: truth, contact, pairs that are left out, and what is missing."""
 
-import time
 import unittest
 
 import numpy as np
 import proximity_testing as pt
 import rospy
-from geometry_msgs.msg import Point, Pose, Quaternion
-from joint_states_test import ARM, JointStatesTest, joint_state
+from joint_states_test import ARM, JointStatesTest
 from proximity_testing import LinkProximity, ProximityArray
 from std_msgs.msg import Float64
 
 from ist_proximity.msg import JointRepulsion, LinkPair
-from ist_proximity.srv import AttachObject, AttachObjectRequest, DetachObject, ListLinkPairs
+from ist_proximity.srv import DetachObject, ListLinkPairs
 
 SRDF = '<robot name="arm"><disable_collisions link1="box_link" link2="ball_link"/></robot>'
 SRDF_DEFAULT = '<robot name="arm"><disable_default_collisions link="box_link"/></robot>'
@@ -30,8 +28,8 @@ class SelfProximityTest(unittest.TestCase):
     def start(self, case, arm=ARM, **parameters):
         self.namespace = "/self_" + case
         self.q = {"turn": 0.7, "slide": 0.1}
-        publisher = JointStatesTest.joint_publisher(self.namespace)
-        self.joints = pt.Repeater(100, lambda: publisher.publish(joint_state(self.q)))
+        self.world = pt.World(self.namespace, None)  # the arm has the camera
+        self.joints = self.world.start_joints(lambda: self.q)
         parameters = {
             "pose_source": "joint_states",
             "self_collision/enabled": True,
@@ -42,7 +40,7 @@ class SelfProximityTest(unittest.TestCase):
         return self.node
 
     def tearDown(self):
-        self.joints.stop()
+        self.world.stop()
         self.assertEqual(self.node.stop(), 0)
 
     def check_vectors(self, one):
@@ -120,10 +118,10 @@ class SelfProximityTest(unittest.TestCase):
                 stamp = rospy.Time.now()
                 q = motion(stamp.to_sec())
                 names = [often, rare] if len(sent) % 5 == 0 else [often]
-                publisher.publish(joint_state({name: q[name] for name in names}, stamp))
+                publisher.publish(pt.joint_state({name: q[name] for name in names}, stamp))
                 sent.append(stamp)
 
-            self.joints = pt.Repeater(60, send)
+            self.joints = self.world.repeat(60, send)
             node.wait_until(lambda: len(sent) > 60, "a second of positions")
             beyond, below = [], []
             for message in node.next_messages(150):
@@ -145,14 +143,14 @@ class SelfProximityTest(unittest.TestCase):
 
     def link_pairs(self, until=lambda answer: answer.success, **kwargs):
         """The answer of ~link_pairs, which comes a little after the model."""
-        service = self.node.service("link_pairs", ListLinkPairs)
-        end = time.monotonic() + pt.TIMEOUT
-        while True:
-            answer = service(**kwargs)
-            if until(answer):
-                return answer
-            self.assertLess(time.monotonic(), end, answer)
-            time.sleep(0.05)
+        service, answers = self.node.service("link_pairs", ListLinkPairs), []
+
+        def ask():
+            answers.append(service(**kwargs))
+            return until(answers[-1])
+
+        pt.wait_until(ask, "the link pairs")
+        return answers[-1]
 
     def test_sampled_pairs(self):
         """The one pair is watched, and touches in the share of random configurations that it has to."""
@@ -185,40 +183,22 @@ class SelfProximityTest(unittest.TestCase):
         """With in_minimum the links push each other apart in ~joint_repulsion too."""
         node = self.start("pushed", **{"self_collision/in_minimum": True, "self_filter": False})
         self.q = {"turn": 0.7, "slide": 0.0}
-        world = pt.World(self.namespace)
-        world.start_points([[9.0, 9.0, 9.0]])
-        efforts = []
-        subscriber = rospy.Subscriber(node.name + "/joint_repulsion", JointRepulsion, efforts.append)
-        try:
-            # Each is pushed by 1 - 0.25 / 0.3, and they part by 2.5 m per metre of the slide.
-            wanted = 2.5 * (1 - 0.25 / 0.3)
-            end = time.monotonic() + pt.TIMEOUT
-            while True:
-                time.sleep(0.05)
-                last = efforts[-1] if efforts else None
-                if last and last.status == ProximityArray.OK:
-                    effort = dict(zip(last.joints, last.effort))
-                    if abs(effort["slide"] - wanted) < 0.02:
-                        break
-                self.assertLess(time.monotonic(), end, last)
-        finally:
-            subscriber.unregister()
-            world.stop()
+        self.world.start_points([[9.0, 9.0, 9.0]])
+        efforts = node.collect("joint_repulsion", JointRepulsion)
+        # Each is pushed by 1 - 0.25 / 0.3, and they part by 2.5 m per metre of the slide.
+        wanted = 2.5 * (1 - 0.25 / 0.3)
+
+        def is_pushed(m):
+            return m.status == 0 and abs(dict(zip(m.joints, m.effort))["slide"] - wanted) < 0.02
+
+        pt.first_of(efforts, is_pushed, "the efforts")
 
     def test_what_touches_at_rest_because_it_is_carried(self):
         """A tool that is in the box with all joints at zero is far from it elsewhere, and watched."""
         node = self.start("carried")
         self.q["slide"] = 0.5
         node.wait_for_distance(1.5, "the box", within=0.0011)
-        attach = node.service("attach_object", AttachObject)
-        answer = attach(
-            name="tool",
-            link="ball_link",
-            shape=AttachObjectRequest.SPHERE,
-            dimensions=[0.1],
-            pose=Pose(Point(-0.3, 0.0, 0.0), Quaternion(w=1.0)),
-        )
-        self.assertTrue(answer.success, answer.message)
+        node.attach("ball_link", (-0.3, 0.0, 0.0), [0.1])
         message = node.wait_for_distance(1.2, "the box from the tool", within=0.0011)
         self.assertLessEqual(pt.link(message, "ball_link").lower_bound, 1.2 + 1e-6)
         self.q["slide"] = 0.0
@@ -228,29 +208,19 @@ class SelfProximityTest(unittest.TestCase):
         """As soon as it is known again, ~min_distance is that of the links with the tool."""
         node = self.start("minimum", **{"self_collision/in_minimum": True, "self_filter": False})
         self.q["slide"] = 0.5
-        world = pt.World(self.namespace)
-        world.start_points([[9.0, 9.0, 9.0]], rate=100)
-        minima = []
-        subscriber = rospy.Subscriber(node.name + "/min_distance", Float64, lambda m: minima.append(m.data))
-        attach = node.service("attach_object", AttachObject)
+        self.world.start_points([[9.0, 9.0, 9.0]], rate=100)
+        minima, firsts = node.collect("min_distance", Float64, lambda m: m.data), []
         detach = node.service("detach_object", DetachObject)
-        pose = Pose(Point(-0.3, 0.0, 0.0), Quaternion(w=1.0))
-        tool = {"name": "tool", "link": "ball_link", "shape": AttachObjectRequest.SPHERE}
-        firsts = []
-        try:
-            for _ in range(12):
-                pt.wait_until(lambda: minima and abs(minima[-1] - 1.5) < 0.0011, "the minimum")
-                begin = len(minima)
-                self.assertTrue(attach(dimensions=[0.1], pose=pose, **tool).success)
-                pt.wait_until(lambda: abs(minima[-1] - 1.2) < 0.0011, "the minimum with the tool")
-                after = minima[begin:]
-                unknown = np.flatnonzero(np.isnan(after))
-                if unknown.size:
-                    firsts += [one for one in after[unknown[0] :] if np.isfinite(one)]
-                self.assertTrue(detach("tool").success)
-        finally:
-            subscriber.unregister()
-            world.stop()
+        for _ in range(12):
+            pt.wait_until(lambda: minima and abs(minima[-1] - 1.5) < 0.0011, "the minimum")
+            begin = len(minima)
+            node.attach("ball_link", (-0.3, 0.0, 0.0), [0.1])
+            pt.wait_until(lambda: abs(minima[-1] - 1.2) < 0.0011, "the minimum with the tool")
+            after = minima[begin:]
+            unknown = np.flatnonzero(np.isnan(after))
+            if unknown.size:
+                firsts += [one for one in after[unknown[0] :] if np.isfinite(one)]
+            self.assertTrue(detach("tool").success)
         self.assertTrue(firsts)
         self.assertLessEqual(max(firsts), 1.2 + 1e-6)
 

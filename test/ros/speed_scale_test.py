@@ -38,9 +38,8 @@ class SpeedScaleTest(pt.NodeTest):
 
     def start(self, urdf, wait=True, **parameters):
         node = super().start(urdf, **parameters)
-        self.smallest, self.scales = [], []
-        node.subscribe("min_distance", Float64, lambda m: self.smallest.append(m.data))
-        node.subscribe("speed_scale_state", SpeedScaleState, self.scales.append)
+        self.smallest = node.collect("min_distance", Float64, lambda m: m.data)
+        self.scales = node.collect("speed_scale_state", SpeedScaleState)
         if wait:
             node.wait_for_status(ProximityArray.OK)
             node.wait_until(lambda: self.scales and self.smallest, "the summary")

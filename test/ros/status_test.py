@@ -17,9 +17,8 @@ class StatusTest(pt.NodeTest):
     POINTS = POINT
 
     def test_no_cloud_stale_cloud_recovery(self):
-        smallest = []
         node = self.start()
-        node.subscribe("min_distance", Float64, lambda m: smallest.append(m.data))
+        smallest = node.collect("min_distance", Float64, lambda m: m.data)
         self.world.start_tf()
         message = node.wait_for_status(ProximityArray.NO_CLOUD, "'cloud'")
         self.assertIn(self.namespace + "/cloud", message.status_text)
@@ -147,31 +146,15 @@ class StatusTest(pt.NodeTest):
         for distance in {pt.link(m, "ball_link").distance for m in known}:
             self.assertAlmostEqual(distance, 0.2, 5)
 
-    def start_late_tf(self, late):
-        def send_late_tf():
-            stamp = rospy.Time.now() - rospy.Duration(late)
-            self.world.publish_transforms(
-                [
-                    pt.transform_message(parent, child, X, stamp)
-                    for child, (parent, X) in self.world.poses.items()
-                ]
-            )
-
-        self.world.repeat(50, send_late_tf)
-
-    def expect_ok(self, node):
-        """150 messages, of which hardly any is not OK."""
+    def test_late_tf(self):
+        """Clouds that are 0.15 s ahead of tf are used as soon as tf has caught up."""
+        node = self.start()
+        self.world.repeat(50, lambda: self.world.send_tf(late=0.15))
+        self.world.start_clouds()
         node.wait_for_status(ProximityArray.OK)
         messages = undisturbed(lambda: node.next_messages(150))
         late = [m for m in messages if m.status != ProximityArray.OK]
         self.assertLess(len(late), 15, late[-1].status_text if late else "")
-
-    def test_late_tf(self):
-        """Clouds that are 0.15 s ahead of tf are used as soon as tf has caught up."""
-        node = self.start()
-        self.start_late_tf(0.15)
-        self.world.start_clouds()
-        self.expect_ok(node)
         # The wait is no reason for a warning.
         node.diagnostics.pop("input cloud", None)
         node.wait_until(

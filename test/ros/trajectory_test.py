@@ -2,7 +2,6 @@
 """~trajectory: first contact, clearance and cancelling, and what cannot be watched."""
 
 import subprocess
-import threading
 import time
 
 import genpy.dynamic
@@ -11,8 +10,7 @@ import proximity_testing as pt
 import rospy
 from actionlib_msgs.msg import GoalID
 from geometry_msgs.msg import Pose, Quaternion
-from joint_states_test import ARM, joint_state
-from sensor_msgs.msg import JointState
+from joint_states_test import ARM
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import Marker, MarkerArray
@@ -69,51 +67,38 @@ class TrajectoryTest(pt.NodeTest):
     def setUp(self):
         super().setUp()
         self.points = np.array([[POINT, 0.0, 0.5]])
-        self.heard, self.cancelled = [], []
-        self.condition = threading.Condition()
+        self.cancelled = []
         self.start_time = rospy.Time.now() + rospy.Duration(1e6)
-        self.at_rest = self.turn = self.speed = 0.0
+        self.at_rest = self.turn = 0.0
+        self.speeds = [0.0, 0.0]
 
     def slide(self):
         """Where the robot is: it follows its trajectory."""
         time_now = (rospy.Time.now() - self.start_time).to_sec()
         return FAR * min(max(time_now / DURATION, 0.0), 1.0) + self.at_rest
 
-    def joint_state(self):
-        message = joint_state({"turn": self.turn, "slide": self.slide()})
-        message.velocity = [self.speed] * len(message.name)
-        return message
-
     def start(self, urdf=ARM, **parameters):
         super().start(urdf, pose_source="joint_states", self_filter=False, **parameters)
-        self.node.subscribe("trajectory_clearance", TrajectoryClearance, self.hear)
+        self.heard = self.node.collect("trajectory_clearance", TrajectoryClearance)
         cancel = self.namespace + "/arm/cancel"
         self.subscriber = rospy.Subscriber(
             cancel, GoalID, lambda _: self.cancelled.append(rospy.Time.now())
         )
         self.sender = rospy.Publisher(self.node.name + "/trajectory", JointTrajectory, queue_size=1)
-        joints = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
-        self.world.repeat(100, lambda: joints.publish(self.joint_state()))
+        self.world.start_joints(
+            lambda: {"turn": self.turn, "slide": self.slide()}, velocities=self.speeds
+        )
         self.world.start_points(lambda: self.points)
         self.node.wait_for_status(0)
         pt.wait_until(lambda: self.sender.get_num_connections() > 0, "the node to listen")
 
-    def hear(self, message):
-        with self.condition:
-            self.heard.append(message)
-            self.condition.notify_all()
-
     def wait(self, condition, what, begin=None):
-        """The first message from now, or from `begin` on, for which the condition holds."""
-        at = len(self.heard) if begin is None else begin
-        end = time.monotonic() + pt.TIMEOUT
-        with self.condition:
-            while True:
-                for message in self.heard[at:]:
-                    if condition(message):
-                        return message
-                self.assertLess(time.monotonic(), end, "%s; last: %s" % (what, self.heard[-1:]))
-                self.condition.wait(0.1)
+        return pt.first_of(self.heard, condition, what, begin)
+
+    def check_touch(self, told, touch=TOUCH):
+        """A contact is told shortly before it is true, [s] after the start."""
+        contact = (told.contact - told.start).to_sec()
+        self.assertTrue(touch - 0.02 < contact <= touch, (contact, touch))
 
     def send(self, velocities=None):
         self.start_time = rospy.Time.now() + rospy.Duration(0.3)
@@ -131,9 +116,7 @@ class TrajectoryTest(pt.NodeTest):
         self.assertEqual(first.header.frame_id, "base")
         self.assertEqual(first.start, self.start_time)
         self.assertAlmostEqual((first.end - first.start).to_sec(), DURATION, places=6)
-        contact = (first.contact - first.start).to_sec()
-        self.assertLessEqual(contact, TOUCH)
-        self.assertGreater(contact, TOUCH - 0.02)
+        self.check_touch(first)
         self.assertAlmostEqual(
             first.time_to_contact, (first.contact - first.header.stamp).to_sec(), places=6
         )
@@ -149,8 +132,7 @@ class TrajectoryTest(pt.NodeTest):
         told = [m for m in self.heard if m.state == m.CONTACT]
         self.assertGreater(len(told), 10)
         for message in told:
-            left = (message.contact - message.start).to_sec()
-            self.assertTrue(TOUCH - 0.02 < left <= TOUCH, left)
+            self.check_touch(message)
         self.assertLess(np.median([m.computation_time for m in told]), 0.1)
 
     def test_clear_until_it_is_over(self):
@@ -236,9 +218,7 @@ class TrajectoryTest(pt.NodeTest):
         self.send()
         told = self.wait(lambda m: m.state == m.CONTACT, "the tool at the post", 0)
         self.assertEqual(told.first.link, "post")
-        touch = DURATION * 0.6 / FAR
-        contact = (told.contact - told.start).to_sec()
-        self.assertTrue(touch - 0.02 < contact <= touch, contact)
+        self.check_touch(told, DURATION * 0.6 / FAR)
 
     # Obstacles stand still from now on, and are where they are now, not where tf saw them last.
     def test_objects_in_late_frames_are_nearer(self):
@@ -287,8 +267,7 @@ class TrajectoryTest(pt.NodeTest):
 
     def test_the_ghost_of_the_first_contact(self):
         self.start(trajectory={"tolerance": 1.0})
-        drawn = []
-        self.node.subscribe("trajectory_markers", MarkerArray, drawn.append)
+        drawn = self.node.collect("trajectory_markers", MarkerArray)
         self.send()
         told = self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
         pt.wait_until(lambda: drawn, "the ghost")
@@ -364,16 +343,15 @@ class TrajectoryTest(pt.NodeTest):
         self.start(trajectory={"tolerance": 1.0})
         self.sender.publish(trajectory([(DURATION, FAR)], rospy.Time()))
         told = self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
-        contact = (told.contact - told.start).to_sec()
-        self.assertTrue(TOUCH - 0.02 < contact <= TOUCH, contact)
+        self.check_touch(told)
         # With velocities it goes on as fast as it moves now.
-        for self.speed, touch in ((0.0, self.touch_of_cubic(0.0)), (0.4, self.touch_of_cubic(0.4))):
+        for speed in (0.0, 0.4):
+            self.speeds[:] = [speed] * 2
             rospy.sleep(0.2)
             sent = rospy.Time.now()
             self.sender.publish(trajectory([(DURATION, FAR)], rospy.Time(), velocities=[[0.0]]))
             told = self.wait(lambda m, sent=sent: m.state == m.CONTACT and m.start >= sent, "a contact")
-            contact = (told.contact - told.start).to_sec()
-            self.assertTrue(touch - 0.02 < contact <= touch, (contact, touch))
+            self.check_touch(told, self.touch_of_cubic(speed))
 
     def touch_of_cubic(self, speed):
         """When the slide touches that begins at 0 with this speed and stands at its end."""
@@ -393,8 +371,7 @@ class TrajectoryTest(pt.NodeTest):
             at = len(self.heard)
             self.sender.publish(path)
             told = self.wait(lambda m: m.state == m.CONTACT, "a contact", at)
-            contact = (told.contact - told.start).to_sec()
-            self.assertTrue(TOUCH - 0.02 < contact <= TOUCH, contact)
+            self.check_touch(told)
 
     def test_goals_of_controllers_and_planners(self):
         """The bridge reads whatever definition a publisher sends."""

@@ -127,7 +127,7 @@ class Watched:
 
     def __init__(self, kind, setting):
         self.namespace = "/%s_%s" % (kind, setting)
-        self.kind, self.setting, self.scales = kind, setting, []
+        self.kind, self.setting = kind, setting
         self.world = pt.World(self.namespace)
         self.world.stand(pt.transform((0, 0, 1)), pt.transform((0.6, 0, 1)))
         self.world.start_tf(20)
@@ -138,7 +138,7 @@ class Watched:
         if setting == "unknown":
             parameters["unknown_space"] = "obstacle"
         self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
-        self.node.subscribe("speed_scale_state", SpeedScaleState, self.scales.append)
+        self.scales = self.node.collect("speed_scale_state", SpeedScaleState)
 
     def of(self, begin):
         """The messages that rest on something measured since."""

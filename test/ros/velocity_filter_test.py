@@ -78,13 +78,8 @@ class Filter:
         ]
         self.publisher = rospy.Publisher(self.name + "/command", self.kind, queue_size=1)
         self._log = tempfile.TemporaryFile()
-        self.process = subprocess.Popen(
-            [pt.find_program(*self.program), *self.arguments]
-            + ["__ns:=" + namespace, "__name:=filter"]
-            + ["/tf:=" + namespace + "/tf", "/tf_static:=" + namespace + "/tf_static"],
-            stdout=self._log,
-            stderr=subprocess.STDOUT,
-        )
+        command = [pt.find_program(*self.program), *self.arguments]
+        self.process = pt.start_program(command, namespace, "filter", self._log)
         pt.wait_until(lambda: self.publisher.get_num_connections() == 1, "the filter")
 
     def is_heard(self):
@@ -98,7 +93,9 @@ class Filter:
         return self.process.wait(pt.TIMEOUT)
 
 
-class VelocityFilterTest(pt.NodeTest):
+class SlidesTest(pt.NodeTest):
+    """A ball on two slides, which goes as the filter lets it."""
+
     BOX, POINTS = None, wall()
 
     def setUp(self):
@@ -110,8 +107,42 @@ class VelocityFilterTest(pt.NodeTest):
         self.joint_publisher = rospy.Publisher(
             self.namespace + "/joint_states", JointState, queue_size=10
         )
-        self.nearest = np.inf
+        self.nearest, self.way = np.inf, lambda: self.q[0]
+        self.count, self.seldom = 0, 1  # periods, and after how many a joint state comes
         self.robot = self.world.repeat(1.0 / PERIOD, self.move)
+
+    def tearDown(self):
+        if self.filter:
+            self.filter.stop()
+        super().tearDown()
+
+    def move(self):
+        """One period of the robot, which follows the last velocity that it was given."""
+        with self.lock:
+            if self.filter and self.filter.given:
+                self.velocity = self.given_velocity(self.filter.given[-1])
+            self.q = self.q + PERIOD * self.velocity
+            self.nearest = min(self.nearest, WALL - RADIUS - self.way())
+            self.count += 1
+        if self.count % self.seldom == 0:
+            self.send_joints(self.q)
+
+    def send_joints(self, q):
+        self.joint_publisher.publish(pt.joint_state(dict(zip(JOINTS, q))))
+
+    def given_velocity(self, message):
+        if isinstance(message, JointTrajectory):
+            return np.array(message.points[0].velocities)
+        if isinstance(message, TwistStamped):  # of a ball on two slides
+            return np.array([message.twist.linear.x, message.twist.linear.y])
+        if isinstance(message, Twist):  # of BASE
+            return np.array([-message.linear.y, message.linear.x])
+        return np.array(message.data if isinstance(message, Float64MultiArray) else message.velocity)
+
+
+class VelocityFilterTest(SlidesTest):
+    def setUp(self):
+        super().setUp()
         has_post = "post" in self._testMethodName
         has_padding = "padding" in self._testMethodName
         robot = REDUNDANT if "redundant" in self._testMethodName else SLIDES
@@ -127,34 +158,6 @@ class VelocityFilterTest(pt.NodeTest):
             **{"self_collision/enabled": has_post},
         )
         self.node.wait_for_status(ProximityArray.OK)
-
-    def tearDown(self):
-        if self.filter:
-            self.filter.stop()
-        super().tearDown()
-
-    def move(self):
-        """One period of the robot, which follows the last velocity that it was given."""
-        with self.lock:
-            if self.filter and self.filter.given:
-                self.velocity = self.given_velocity(self.filter.given[-1])
-            self.q = self.q + PERIOD * self.velocity
-            self.nearest = min(self.nearest, WALL - RADIUS - self.q[0])
-        self.send_joints(self.q)
-
-    def send_joints(self, q):
-        state = JointState(name=JOINTS, position=list(q))
-        state.header.stamp = rospy.Time.now()
-        self.joint_publisher.publish(state)
-
-    def given_velocity(self, message):
-        if isinstance(message, JointTrajectory):
-            return np.array(message.points[0].velocities)
-        if isinstance(message, TwistStamped):  # of a ball on two slides
-            return np.array([message.twist.linear.x, message.twist.linear.y])
-        if isinstance(message, Twist):  # of BASE
-            return np.array([-message.linear.y, message.linear.x])
-        return np.array(message.data if isinstance(message, Float64MultiArray) else message.velocity)
 
     def command(self, *velocity):
         if self.filter.kind is JointTrajectory:
@@ -181,21 +184,20 @@ class VelocityFilterTest(pt.NodeTest):
 
     def wait_for(self, status, text=""):
         """The first state from now on that says so."""
-        begin = len(self.filter.states)
-        found = []
+        return pt.first_of(
+            self.filter.states,
+            lambda s: s.status == status and text in s.status_text,
+            "status %d with '%s'" % (status, text),
+        )
 
-        def look():
-            found[:] = [
-                s for s in self.filter.states[begin:] if s.status == status and text in s.status_text
-            ]
-            return found
+    def check_stopped(self, distance):
+        """It has not come nearer to the wall."""
+        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
+        self.assertGreaterEqual(self.nearest, distance - 0.005)
 
-        try:
-            pt.wait_until(look, "status %d with '%s'" % (status, text))
-        except AssertionError as error:
-            last = self.filter.states[-1] if self.filter.states else None
-            raise AssertionError("%s; the last state is\n%s" % (error, last))
-        return found[0]
+    def stand_at_wall(self, away):
+        self.q = np.array([WALL - RADIUS - away, 0.0])
+        self.node.wait_for(lambda m: m.links[0].distance < away + 0.01, "the robot at the wall")
 
     def check_fault(self, text):
         state = self.wait_for(FilterState.FAULT, text)
@@ -210,8 +212,7 @@ class VelocityFilterTest(pt.NodeTest):
         self.assertEqual(limited.links, ["ball"])
         self.assertEqual(limited.sources, ["cloud"])
         self.assertEqual(list(limited.command), [0.5, 0.1])
-        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
-        self.assertGreaterEqual(self.nearest, STOP - 0.005)
+        self.check_stopped(STOP)
         self.assertLess(WALL - RADIUS - self.q[0], STOP + 0.15)
         # Along the wall it still goes.
         self.assertGreater(self.velocity[1], 0.05)
@@ -252,15 +253,13 @@ class VelocityFilterTest(pt.NodeTest):
         """Points within the padding are taken for the robot: nothing would be near there."""
         self.start(0.5, 0.0)
         self.wait_for(FilterState.LIMITED)
-        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
-        self.assertGreaterEqual(self.nearest, STOP + PADDING - 0.005)
+        self.check_stopped(STOP + PADDING)
         self.assertEqual([s.blind_skin for s in self.node.wait_for_status(ProximityArray.OK).sources], [PADDING])
 
     def test_stops_where_what_hides_may_have_come(self):
         self.start(0.5, 0.0, obstacle_speed=0.4, obstacle_age=0.5)
         self.wait_for(FilterState.LIMITED)
-        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
-        self.assertGreaterEqual(self.nearest, STOP + 0.4 * 0.5 - 0.005)
+        self.check_stopped(STOP + 0.4 * 0.5)
 
     def test_stops_before_a_post_of_its_own(self):
         self.start(0.0, 0.4, self_proximity=True)
@@ -280,8 +279,7 @@ class VelocityFilterTest(pt.NodeTest):
 
     def test_ignored_links(self):
         """The robot stands near the wall, and is to touch it."""
-        self.q = np.array([WALL - RADIUS - 0.02, 0.0])
-        self.node.wait_for(lambda m: m.links[0].distance < 0.03, "the ball at the wall")
+        self.stand_at_wall(0.02)
         self.robot.function = lambda: self.send_joints(self.q)
         self.start(0.2, 0.0)
         self.wait_for(FilterState.LIMITED)
@@ -298,8 +296,7 @@ class VelocityFilterTest(pt.NodeTest):
         self.assertEqual(list(limited.joints), JOINTS)
         self.assertEqual(limited.links, ["ball"])
         np.testing.assert_allclose(limited.command, [0.5, 0.1], atol=1e-9)
-        pt.wait_until(lambda: abs(self.velocity[0]) < 0.01, "the ball to stand")
-        self.assertGreaterEqual(self.nearest, STOP - 0.005)
+        self.check_stopped(STOP)
         self.assertGreater(self.velocity[1], 0.05)
         self.assertEqual(self.filter.given[-1].header.frame_id, "ball")
         self.wanted = (-0.3, 0.0)
@@ -316,8 +313,7 @@ class VelocityFilterTest(pt.NodeTest):
 
     def test_twist_of_a_redundant_robot(self):
         """The second slide could make the twist, but who receives it may take both."""
-        self.q = np.array([WALL - RADIUS - 0.03, 0.0])
-        self.node.wait_for(lambda m: pt.link(m, "beam").distance < 0.04, "the beam at the wall")
+        self.stand_at_wall(0.03)  # with its beam, which is the first link
         self.robot.function = lambda: self.send_joints(self.q)
         self.start(0.1, 0.0, command_type="geometry_msgs/TwistStamped")
         state = self.wait_for(FilterState.STOPPED, "'beam'")
@@ -351,8 +347,7 @@ class VelocityFilterTest(pt.NodeTest):
         pt.wait_until(lambda: not np.any(self.velocity), "0 after a timeout")
 
     def test_started_inside_the_stop_distance(self):
-        self.q = np.array([WALL - RADIUS - 0.02, 0.0])
-        self.node.wait_for(lambda m: m.links[0].distance < 0.03, "the ball at the wall")
+        self.stand_at_wall(0.02)
         self.start(0.5, 0.0)
         state = self.wait_for(FilterState.LIMITED)
         self.assertLessEqual(state.velocity[0], 0.0)
@@ -366,14 +361,12 @@ class VelocityFilterTest(pt.NodeTest):
         pt.wait_until(lambda: not np.any(self.given_velocity(given[-1])), "0 at the end")
 
     def wait_for_scale(self, low, high, what):
-        begin = len(self.filter.scales)
-        is_it = lambda: [s for s in self.filter.scales[begin:] if low <= s <= high]  # noqa: E731
-        pt.wait_until(is_it, "a scale of %g to %g: %s" % (low, high, what))
+        what = "a scale of %g to %g: %s" % (low, high, what)
+        pt.first_of(self.filter.scales, lambda s: low <= s <= high, what)
 
     def test_speed_scale_of_a_command(self):
         """The robot stands where it is: the scale is for others to use."""
-        self.q = np.array([WALL - RADIUS - 0.02, 0.0])
-        self.node.wait_for(lambda m: m.links[0].distance < 0.03, "the ball at the wall")
+        self.stand_at_wall(0.02)
         self.robot.function = lambda: self.send_joints(self.q)
         self.start(0.2, 0.0)
         self.wait_for_scale(0.0, 0.0, "an approach within the stop distance")
@@ -414,6 +407,16 @@ class VelocityFilterTest(pt.NodeTest):
         begin = len(self.filter.scales)
         self.filter.process.terminate()
         pt.wait_until(lambda: 0.0 in self.filter.scales[begin:], "0 at the end")
+
+    def answer(self, message, ahead):
+        """Publishes it in place of the node, with stamps ahead of the clock."""
+        answers = rospy.Publisher(self.namespace + "/proximity/proximity", ProximityArray, queue_size=1)
+
+        def send():
+            message.header.stamp = rospy.Time.now() + ahead
+            answers.publish(message)
+
+        return self.world.repeat(50, send)
 
     def test_faults(self):
         self.start(0.1, 0.0, command_type="std_msgs/Float64MultiArray")
@@ -457,15 +460,9 @@ class VelocityFilterTest(pt.NodeTest):
         self.assertFalse(np.any(self.given_velocity(self.filter.given[-1])))
 
         # Before a robot's URDF is known, a node watches no link.
-        answers = rospy.Publisher(self.namespace + "/proximity/proximity", ProximityArray, queue_size=1)
-
-        def answer_nothing():
-            message = ProximityArray(status=ProximityArray.LOADING, status_text="no URDF yet")
-            message.header.stamp = rospy.Time.now()
-            message.header.frame_id = "base"
-            answers.publish(message)
-
-        self.world.repeat(50, answer_nothing)
+        nothing = ProximityArray(status=ProximityArray.LOADING, status_text="no URDF yet")
+        nothing.header.frame_id = "base"
+        self.answer(nothing, rospy.Duration(0.0))
         self.check_fault("of no link: no URDF yet")
 
     def test_joints_that_are_commanded_apart(self):
@@ -511,12 +508,10 @@ class VelocityFilterTest(pt.NodeTest):
     def test_stamps_that_are_ahead(self):
         """As long as they lie ahead, nobody could tell that no more come."""
         ahead = rospy.Duration(0.8)
-        joints = self.joint_publisher
 
         def send_ahead():
-            state = JointState(name=JOINTS, position=[0.0, 0.0])
-            state.header.stamp = rospy.Time.now() + ahead
-            joints.publish(state)
+            state = dict.fromkeys(JOINTS, 0.0)
+            self.joint_publisher.publish(pt.joint_state(state, rospy.Time.now() + ahead))
 
         self.start(0.1, 0.0)
         self.wait_for(FilterState.FREE)
@@ -531,17 +526,12 @@ class VelocityFilterTest(pt.NodeTest):
 
         newest = self.node.messages[-1]
         self.assertEqual(self.node.stop(), 0)
-        answers = rospy.Publisher(self.namespace + "/proximity/proximity", ProximityArray, queue_size=1)
-
-        def answer_ahead():
-            newest.header.stamp = rospy.Time.now() + ahead
-            answers.publish(newest)
-
-        self.world.repeat(50, answer_ahead)
+        answers = self.answer(newest, ahead)
         self.check_fault("ahead of the clock")
 
         # What else no node says: a skin that is no length.
-        ahead = rospy.Duration(0.0)
+        answers.stop()
+        self.answer(newest, rospy.Duration(0.0))
         for skin in (-0.1, np.inf, -np.inf):
             newest.sources[0].blind_skin = skin
             self.check_fault("blind_skin of source 'cloud' is %g m" % skin)
@@ -550,32 +540,19 @@ class VelocityFilterTest(pt.NodeTest):
 
     def check_seldom_states(self, *velocity, least=0.0, **parameters):
         """Between joint states, the robot has moved by all that was given."""
-        self.count = 0
-
-        def move_silently():
-            with self.lock:
-                if self.filter.given:
-                    self.velocity = self.given_velocity(self.filter.given[-1])
-                self.q = self.q + PERIOD * self.velocity
-                self.nearest = min(self.nearest, WALL - RADIUS - self.way())
-                self.count += 1
-            if self.count % 12 == 0:
-                self.send_joints(self.q)
-
         self.start(
             *velocity,
             **{"joint_timeout": 0.3, "proximity_timeout": 0.5, "approach_time": 0.02},
             **{"margin": 0.03, "stop_distance": 0.03},
             **parameters
         )
-        self.robot.function = move_silently
+        self.seldom = 12
         pt.wait_until(lambda: self.nearest < 0.1, "the ball to come near")
         rospy.sleep(1.0)
         print("seldom joint states: nearest %.1f mm" % (1e3 * self.nearest))
         self.assertGreater(self.nearest, least)
 
     def test_joint_states_that_come_seldom(self):
-        self.way = lambda: self.q[0]
         self.check_seldom_states(2.0, 0.0)
 
     def test_joints_commanded_apart_seldom_stated(self):
@@ -596,23 +573,12 @@ class VelocityFilterTest(pt.NodeTest):
 
     def test_trajectories_that_cannot_be_used(self):
         self.start(0.1, 0.0)
+        moving = JointTrajectoryPoint(velocities=[0.1, 0.1])
         for message, text in (
             (JointTrajectory(joint_names=JOINTS), "has 0 points"),
             (JointTrajectory(points=[JointTrajectoryPoint()]), "has no joints"),
-            (
-                JointTrajectory(
-                    joint_names=["along", "neck"],
-                    points=[JointTrajectoryPoint(velocities=[0.1, 0.1])],
-                ),
-                "no joint 'neck'",
-            ),
-            (
-                JointTrajectory(
-                    joint_names=["along", "along"],
-                    points=[JointTrajectoryPoint(velocities=[0.1, 0.1])],
-                ),
-                "twice",
-            ),
+            (JointTrajectory(joint_names=["along", "neck"], points=[moving]), "no joint 'neck'"),
+            (JointTrajectory(joint_names=["along", "along"], points=[moving]), "twice"),
             (
                 JointTrajectory(
                     joint_names=JOINTS, points=[JointTrajectoryPoint(positions=[0.1, 0.1])]
@@ -637,12 +603,8 @@ class VelocityFilterTest(pt.NodeTest):
     def check_refused(self, parameters, texts):
         for name, value in parameters.items():
             rospy.set_param(self.namespace + "/filter/" + name, value)
-        process = subprocess.Popen(
-            [pt.find_program("nodelet", "nodelet"), "standalone", "ist_proximity/VelocityFilter"]
-            + ["__ns:=" + self.namespace, "__name:=filter"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-        )
+        command = [pt.find_program("nodelet", "nodelet"), "standalone", "ist_proximity/VelocityFilter"]
+        process = pt.start_program(command, self.namespace, "filter", subprocess.PIPE)
         pt.wait_until(lambda: process.poll() is not None, "the nodelet to be refused")
         text = process.stdout.read().decode()
         for expected in texts:

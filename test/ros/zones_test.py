@@ -59,8 +59,7 @@ class ZonesTest(pt.NodeTest):
 
     def test_points_in_a_zone_are_no_obstacles(self):
         node = self.start_node()
-        markers = []
-        node.subscribe("zones", MarkerArray, markers.append)
+        markers = node.collect("zones", MarkerArray)
         self.wait_for_distance(BALL, 0.2, [])
         self.set()
         message = self.wait_for_distance(BALL, 0.5, ["target"])
@@ -245,9 +244,8 @@ class ZonesTest(pt.NodeTest):
 
     def test_links_are_left_out_for_a_while(self):
         node = self.start_node()
-        minima = []
-        node.subscribe("min_distance", Float64, minima.append)
-        is_near = lambda value: minima and abs(minima[-1].data - value) < 0.002  # noqa: E731
+        minima = node.collect("min_distance", Float64, lambda m: m.data)
+        is_near = lambda value: minima and abs(minima[-1] - value) < 0.002  # noqa: E731
         box = pt.distance_to_box(pt.apply(pt.inverse(self.BOX), np.array([NEAR, FAR]))).min()
         node.wait_until(lambda: is_near(0.2), "the ball's distance")
         for links, lifetime, text in (

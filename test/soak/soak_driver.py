@@ -51,59 +51,29 @@ JOINT_RATE, CLOUD_RATE = 1000.0, 30.0
 FAR = np.random.default_rng(0).uniform(-1, 1, (20000, 3)).astype("<f4") + np.float32([0, 0, 6.0])
 
 
-class Joints(threading.Thread):
-    """Joint states; `offset` is added to the stamp, `change` alters a message, None drops it."""
+class Sender(threading.Thread):
+    """Sends what `make` gives for a stamp, at `rate` [Hz]; `offset` is added to the stamp, `change` alters
+    a message, None drops it."""
 
-    def __init__(self, world):
+    def __init__(self, topic, kind, queue_size, rate, make):
         super().__init__(daemon=True)
-        self._world = world
-        self._publisher = rospy.Publisher("joint_states", JointState, queue_size=1000)
-        self.offset, self.change = 0.0, None
+        self._publisher = rospy.Publisher(topic, kind, queue_size=queue_size)
+        self._make = make
+        self.rate, self.offset, self.change = rate, 0.0, None
 
     def run(self):
         due = time.monotonic()
         while not rospy.is_shutdown():
-            stamp = rospy.Time.now() + rospy.Duration(self.offset)
-            message = JointState(name=JOINTS, position=list(self._world.joints(stamp.to_sec())))
-            message.header.stamp = stamp
+            message = self._make(rospy.Time.now() + rospy.Duration(self.offset))
             if self.change:
                 message = self.change(message)
-            if message and not send(self._publisher, message):
-                return
-            due = max(due + 1.0 / JOINT_RATE, time.monotonic() - 0.1)
-            time.sleep(max(0.0, due - time.monotonic()))
-
-
-class Clouds(threading.Thread):
-    """Clouds of the moving points; `rate`, `offset` and `change` as for joints."""
-
-    def __init__(self, world):
-        super().__init__(daemon=True)
-        self._world = world
-        self._publisher = rospy.Publisher("cloud", PointCloud2, queue_size=10)
-        self.rate, self.offset, self.change = CLOUD_RATE, 0.0, None
-
-    def run(self):
-        due = time.monotonic()
-        while not rospy.is_shutdown():
-            stamp = rospy.Time.now() + rospy.Duration(self.offset)
-            points = np.vstack([self._world.points(stamp.to_sec()), FAR])
-            message = pt.cloud(points, "camera", stamp)
-            if self.change:
-                message = self.change(message)
-            if message and not send(self._publisher, message):
+            try:
+                if message:
+                    self._publisher.publish(message)
+            except rospy.ROSException:  # this program ends
                 return
             due = max(due + 1.0 / self.rate, time.monotonic() - 0.1)
             time.sleep(max(0.0, due - time.monotonic()))
-
-
-def send(publisher, message):
-    """Whether it was published; it is not while this program ends."""
-    try:
-        publisher.publish(message)
-    except rospy.ROSException:
-        return False
-    return True
 
 
 def drop(message):
@@ -176,8 +146,15 @@ class Driver:
         self._world = SoakWorld(seed)
         self._events = open(events, "w", buffering=1, encoding="utf-8")
         self._tf = rospy.Publisher("tf_static", TFMessage, queue_size=1, latch=True)
-        self._joints, self._clouds = Joints(self._world), Clouds(self._world)
+        self._joints = Sender("joint_states", JointState, 1000, JOINT_RATE, self._joint_state)
+        self._clouds = Sender("cloud", PointCloud2, 10, CLOUD_RATE, self._cloud)
         self.false_answers = 0
+
+    def _joint_state(self, stamp):
+        return pt.joint_state(dict(zip(JOINTS, self._world.joints(stamp.to_sec()))), stamp)
+
+    def _cloud(self, stamp):
+        return pt.cloud(np.vstack([self._world.points(stamp.to_sec()), FAR]), "camera", stamp)
 
     def send_cameras(self):
         now, messages = rospy.Time.now(), []
