@@ -11,6 +11,7 @@
 #include "ros/parameters/parameters.h"
 #include "ros/poses/usual_period.h"
 #include "ros/status/status.h"
+#include "support/errors.h"
 
 namespace ist {
 namespace {
@@ -79,25 +80,22 @@ TEST(CycleDeadline, StatusSaysWhatItCost) {
   input.deadline.widest = 0.0123;
   Status status = decide(find_all(input, 0.0), true);
   EXPECT_EQ(status.code, ProximityArray::DEGRADED);
-  EXPECT_NE(status.text.find("~query/deadline passed before 3 links met ~query/tolerance"),
-            std::string::npos)
-      << status.text;
-  EXPECT_NE(status.text.find("12.3 mm wide"), std::string::npos) << status.text;
+  test::expect_says(status.text, "~query/deadline passed before 3 links met ~query/tolerance");
+  test::expect_says(status.text, "12.3 mm wide");
 
   input.deadline = DeadlineCost();
   input.deadline.unblended = 1;
   status = decide(find_all(input, 0.0), true);
   EXPECT_EQ(status.code, ProximityArray::DEGRADED);
-  EXPECT_NE(status.text.find("the repulsion of 1 link was blended"), std::string::npos)
-      << status.text;
+  test::expect_says(status.text, "the repulsion of 1 link was blended");
 
   input.deadline = DeadlineCost();
   input.deadline.no_penetration = 2;
   input.deadline.least_known = 0.4;
   status = decide(find_all(input, 0.0), true);
   EXPECT_EQ(status.code, ProximityArray::DEGRADED);
-  EXPECT_NE(status.text.find("the contact volume of 2 links"), std::string::npos) << status.text;
-  EXPECT_NE(status.text.find("40 %"), std::string::npos) << status.text;
+  test::expect_says(status.text, "the contact volume of 2 links");
+  test::expect_says(status.text, "40 %");
 }
 
 }  // namespace

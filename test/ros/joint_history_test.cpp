@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ist_proximity/robot/robot_description.h"
+#include "support/errors.h"
 
 namespace ist {
 namespace {
@@ -141,7 +142,7 @@ TEST_F(JointHistoryTest, TellsOfMimicJointsThatAreNoLongerStated) {
   EXPECT_EQ(history_.late_joint(ros::Time(10.0), 0.1), "");
   add("right", 0.1, 10.0, 10.0);
   add("left", 0.2, 11.0, 11.0);
-  EXPECT_NE(history_.late_joint(ros::Time(11.0), 0.1).find("'right'"), std::string::npos);
+  test::expect_says(history_.late_joint(ros::Time(11.0), 0.1), "'right'");
 }
 
 }  // namespace

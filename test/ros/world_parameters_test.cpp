@@ -6,13 +6,13 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <functional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "ros/input/world_faults.h"
 #include "ros/parameters/parameters.h"
+#include "support/errors.h"
 
 namespace ist {
 namespace {
@@ -96,55 +96,46 @@ TEST(WorldParameters, ATopicHasATimeout) {
   EXPECT_EQ(source.timeout, 2.0);
 }
 
-std::string error_of(const std::function<void(XmlRpcValue*)>& change) {
-  XmlRpcValue tree = good();
-  change(&tree["sources"]["cell"]);
-  std::vector<std::string> warnings;
-  try {
-    parse_parameters(tree, &warnings);
-  } catch (const ParameterError& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 TEST(WorldParameters, MistakesAreNamed) {
-  const auto has = [](const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
+  struct Case {
+    std::vector<const char*> path;  // below the source
+    XmlRpcValue value;
+    const char* words;
   };
-  const std::string table = "~sources/cell/objects/table/";
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["table"]["shape"] = "cube"; }),
-               table + "shape is \"cube\"");
-  EXPECT_PRED2(has, error_of([](auto* cell) {
-                 (*cell)["objects"]["table"]["size"] = list({1.0, 0.0, 1.0});
-               }),
-               table + "size is 0");
-  EXPECT_PRED2(has, error_of([](auto* cell) {
-                 (*cell)["objects"]["table"]["size"] = list({1.0, 1.0});
-               }),
-               table + "size is a list of 2");
-  EXPECT_PRED2(has, error_of([](auto* cell) {
-                 (*cell)["objects"]["table"]["size"] = list({1.0, std::nan(""), 1.0});
-               }),
-               table + "size is");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["table"]["shape"] = "sphere"; }),
-               table + "radius is not set");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["wall"]["mesh"] = ""; }),
-               "wall/mesh is not set");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["wall"]["margin"] = -1.0; }),
-               "wall/margin is -1 m");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["odd"] = 3; }),
-               "~sources/cell/objects/odd is 3: a dictionary is needed");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["allowed_contacts"] = 3; }),
-               "a list of pairs of strings is needed");
-  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["file"] = "cell.scene"; }),
-               "an absolute path is needed");
-  EXPECT_PRED2(has, error_of([](auto* cell) {
-                 XmlRpcValue empty;
-                 empty["type"] = "world";
-                 *cell = empty;
-               }),
-               "at least one of objects, file, topic or robot is needed");
+  XmlRpcValue nothing;
+  nothing["type"] = "world";
+  const Case cases[] = {
+      {{"objects", "table", "shape"}, "cube", "~sources/cell/objects/table/shape is \"cube\""},
+      {{"objects", "table", "size"},
+       list({1.0, 0.0, 1.0}),
+       "~sources/cell/objects/table/size is 0"},
+      {{"objects", "table", "size"},
+       list({1.0, 1.0}),
+       "~sources/cell/objects/table/size is a list of 2"},
+      {{"objects", "table", "size"},
+       list({1.0, std::nan(""), 1.0}),
+       "~sources/cell/objects/table/size is"},
+      {{"objects", "table", "shape"}, "sphere", "~sources/cell/objects/table/radius is not set"},
+      {{"objects", "wall", "mesh"}, "", "wall/mesh is not set"},
+      {{"objects", "wall", "margin"}, -1.0, "wall/margin is -1 m"},
+      {{"objects", "odd"}, 3, "~sources/cell/objects/odd is 3: a dictionary is needed"},
+      {{"allowed_contacts"}, 3, "a list of pairs of strings is needed"},
+      {{"file"}, "cell.scene", "an absolute path is needed"},
+      {{}, nothing, "at least one of objects, file, topic or robot is needed"},
+  };
+  for (const Case& c : cases) {
+    XmlRpcValue tree = good();
+    XmlRpcValue* at = &tree["sources"]["cell"];
+    for (const char* name : c.path) at = &(*at)[name];
+    *at = c.value;
+    std::vector<std::string> warnings;
+    try {
+      parse_parameters(tree, &warnings);
+      ADD_FAILURE() << "no error; expected is " << c.words;
+    } catch (const ParameterError& error) {
+      test::expect_says(error.what(), c.words);
+    }
+  }
 }
 
 // A message that cannot be used is told once, however often it comes; others are told until there
