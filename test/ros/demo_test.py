@@ -58,8 +58,18 @@ class DemoTest(unittest.TestCase):
 
     def wait_for_ok(self, start):
         """The first answer from index start on that is OK, and its index."""
-        answer = pt.first_of(self.answers, lambda m: m.status == ProximityArray.OK, "OK", start, 60.0)
-        return answer, self.answers.index(answer, start)
+        found = []
+
+        def look():
+            with self.lock:
+                for i in range(start, len(self.answers)):
+                    if self.answers[i].status == ProximityArray.OK:
+                        found.append(i)
+                        return True
+            return False
+
+        pt.wait_until(look, "OK; the last is %s" % (self.answers[-1:] or "none"), timeout=60)
+        return self.answers[found[0]], found[0]
 
     def positions(self, stamp):
         """Joint positions at an instant, in URDF order."""

@@ -507,10 +507,10 @@ def wait_until(condition, what, timeout=TIMEOUT, lock=None):
                 lock.wait(0.05)
 
 
-def first_of(messages, condition, what, begin=None, timeout=TIMEOUT):
+def first_of(messages, condition, what, begin=None):
     """Waits for the first of the messages in a growing list, from now or `begin` on, with a condition."""
     i = len(messages) if begin is None else begin
-    deadline = time.monotonic() + timeout
+    deadline = time.monotonic() + TIMEOUT
     while time.monotonic() < deadline:
         while i < len(messages):
             if condition(messages[i]):
