@@ -13,90 +13,73 @@
 namespace ist::sim {
 namespace {
 
-// Each scene has one obstacle, which hits the arm if the arm does not dodge.
-TEST(ClosedLoop, TheArmDodges) {
+// Runs scenes without avoidance and with it, and gives both results to `judge`.
+template <class Judge>
+void compare(ClosedLoopConfig config, const SceneRules& rules, double duration, Avoidance avoidance,
+             std::uint64_t scenes, const Judge& judge) {
   const RobotDescription robot = test::demo_robot();
-  ClosedLoopConfig config;
   const auto nominal = [&](const Scene& scene) {
     return nominal_motion(robot, scene, config.controller);
   };
+  for (std::uint64_t seed = 1; seed <= (test::kSanitized ? 1 : scenes); ++seed) {
+    SCOPED_TRACE(::testing::Message() << "seed " << seed);
+    Scene scene = make_scene(robot, seed, rules, nominal);
+    scene.duration = duration;
+    scene.patience = 4.0;
+    config.avoidance = Avoidance::kNone;
+    const ClosedLoopResult blind = run_closed_loop(robot, test::demo_model(), scene, seed, config);
+    config.avoidance = avoidance;
+    judge(blind, run_closed_loop(robot, test::demo_model(), scene, seed, config));
+  }
+}
+
+// Each scene has one obstacle, which hits the arm if the arm does not dodge.
+TEST(ClosedLoop, TheArmDodges) {
   SceneRules rules;
   rules.obstacles = 1;
   rules.first_aim = 2.0;
   int collisions = 0;
-  const std::uint64_t scenes = test::kSanitized ? 1 : 2;
-  for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
-    Scene scene = make_scene(robot, seed, rules, nominal);
-    scene.duration = scene.patience = 4.0;
-    config.avoidance = Avoidance::kNone;
-    const ClosedLoopResult blind = run_closed_loop(robot, test::demo_model(), scene, seed, config);
+  compare({}, rules, 4.0, Avoidance::kBlend, 2, [&](const auto& blind, const auto& seeing) {
     collisions += blind.smallest_distance <= 0.0 ? 1 : 0;
-    config.avoidance = Avoidance::kBlend;
-    const ClosedLoopResult seeing = run_closed_loop(robot, test::demo_model(), scene, seed, config);
-    EXPECT_GT(seeing.smallest_distance, 0.02) << "seed " << seed << ": " << seeing.link;
-    EXPECT_LT(seeing.smallest_distance, 0.3) << "seed " << seed << ": nothing came near";
-  }
+    EXPECT_GT(seeing.smallest_distance, 0.02) << seeing.link;
+    EXPECT_LT(seeing.smallest_distance, 0.3) << "nothing came near";
+  });
   EXPECT_GT(collisions, 0);
 }
 
 // A body stands in the way of the blind arm.
 TEST(ClosedLoop, TheFilterDrivesIntoNothing) {
-  const RobotDescription robot = test::demo_robot();
   ClosedLoopConfig config;
   config.control_period = 10;
   config.remember = true;
-  const auto nominal = [&](const Scene& scene) {
-    return nominal_motion(robot, scene, config.controller);
-  };
   SceneRules rules;
   rules.obstacles = 0;
   rules.clutter = 3;
   int collisions = 0;
-  const std::uint64_t scenes = test::kSanitized ? 1 : 4;
-  for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
-    Scene scene = make_scene(robot, seed, rules, nominal);
-    scene.duration = scene.patience = 4.0;
-    config.avoidance = Avoidance::kNone;
-    const ClosedLoopResult blind = run_closed_loop(robot, test::demo_model(), scene, seed, config);
+  compare(config, rules, 4.0, Avoidance::kFilter, 4, [&](const auto& blind, const auto& seeing) {
     collisions += blind.driven_at_touch > 0.1 ? 1 : 0;
-    config.avoidance = Avoidance::kFilter;
-    const ClosedLoopResult seeing = run_closed_loop(robot, test::demo_model(), scene, seed, config);
-    EXPECT_GT(seeing.smallest_distance, 0.0) << "seed " << seed << ": " << seeing.link;
-  }
+    EXPECT_GT(seeing.smallest_distance, 0.0) << seeing.link;
+  });
   // The single scene of a sanitizer's run need not have a collision.
-  if (!test::kSanitized) {
-    EXPECT_GT(collisions, 0);
-  }
+  if (!test::kSanitized) EXPECT_GT(collisions, 0);
 }
 
 // The arm, folded below its base, swings its gripper through its stand.
 TEST(ClosedLoop, TheFilterKeepsLinksApart) {
-  const RobotDescription robot = test::demo_robot();
   ClosedLoopConfig config;
   config.control_period = 10;
-  const Arm arm(robot, demo_arm());
-  OwnDistances own(robot, test::demo_model(), config.query);
+  const Arm arm(test::demo_robot(), demo_arm());
+  OwnDistances own(test::demo_robot(), test::demo_model(), config.query);
   SceneRules rules;
   rules.obstacles = 0;
   rules.goal_clearance = 0.12;
   rules.own_distance = [&](const Eigen::VectorXd& q) { return own.least(arm.link_poses(q)); };
-  const auto nominal = [&](const Scene& scene) {
-    return nominal_motion(robot, scene, config.controller);
-  };
-  const std::uint64_t scenes = test::kSanitized ? 1 : 3;
-  for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
-    Scene scene = make_scene(robot, seed, rules, nominal);
-    scene.duration = 0.0;
-    scene.patience = 4.0;
-    config.avoidance = Avoidance::kNone;
-    const ClosedLoopResult blind = run_closed_loop(robot, test::demo_model(), scene, seed, config);
-    EXPECT_LE(blind.own_distance, 0.0) << "seed " << seed;
-    EXPECT_GT(blind.driven_at_touch, 0.005) << "seed " << seed;
-    config.avoidance = Avoidance::kFilter;
-    const ClosedLoopResult seeing = run_closed_loop(robot, test::demo_model(), scene, seed, config);
-    EXPECT_GT(seeing.own_distance, 0.0) << "seed " << seed;
-    EXPECT_LT(seeing.own_distance, 0.02) << "seed " << seed << ": it did not come near";
-  }
+  compare(config, rules, 0.0, Avoidance::kFilter, 3, [](const auto& blind, const auto& seeing) {
+    EXPECT_LE(blind.own_distance, 0.0);
+    EXPECT_GT(blind.driven_at_touch, 0.005);
+    EXPECT_GT(seeing.own_distance, 0.0);
+    EXPECT_LT(seeing.own_distance, 0.02) << "it did not come near";
+  });
 }
 
 // A minute of moving in view of a camera with 5 mm of noise and 50 ms of latency.
