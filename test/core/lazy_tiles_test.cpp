@@ -53,9 +53,15 @@ std::vector<Eigen::Vector3d> points_F(const std::vector<float>& pixels,
   return points;
 }
 
+const std::vector<TriangleMesh>& meshes() {
+  static const std::vector<TriangleMesh> kMeshes = {
+      test::l_shape(0.2, 0.05), test::icosphere(0.08, 2), test::box({0.05, 0.1, 0.2})};
+  return kMeshes;
+}
+
 struct Scene {
   explicit Scene(test::Rng* rng) : X_FS(test::random_pose(rng, 0.5)), pixels(depth_image(rng)) {
-    for (std::size_t i = 0; i < meshes.size(); ++i) {
+    for (std::size_t i = 0; i < meshes().size(); ++i) {
       Eigen::Isometry3d X_SL = test::random_pose(rng, 0.25);
       X_SL.pretranslate(Eigen::Vector3d(0.0, 0.0, 0.5));
       X_FL.push_back(X_FS * X_SL);
@@ -66,31 +72,37 @@ struct Scene {
     for (const Eigen::Vector3d& p : points_F(*pixels, X_FS)) {
       points_L.push_back(X_FL[link].inverse() * p);
     }
-    return test::oracle_minimum(meshes[link], points_L);
+    return test::oracle_minimum(meshes()[link], points_L);
+  }
+  std::vector<LinkProximity> answers(const CloudSnapshot& cloud) const {
+    static const auto model = test::make_model({meshes().begin(), meshes().end()}, 0.005);
+    QueryConfig config;
+    config.max_distance = 5.0;
+    config.tolerance = 0.0;
+    std::vector<LinkProximity> links;
+    EXPECT_TRUE(ProximityQuery(model, config).run(X_FL, {true, true, true}, {&cloud}, &links));
+    return links;
   }
 
-  std::vector<TriangleMesh> meshes = {test::l_shape(0.2, 0.05), test::icosphere(0.08, 2),
-                                      test::box({0.05, 0.1, 0.2})};
   Eigen::Isometry3d X_FS;
   std::shared_ptr<std::vector<float>> pixels;
   std::vector<Eigen::Isometry3d> X_FL;
 };
 
-TEST(LazyTiles, AnswersAgainstBruteForce) {
+class LazyTiles : public ::testing::Test {
+ protected:
+  void see(const Scene& scene) { ingest_.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud_); }
+
+  Ingest ingest_{test::whole_cloud(false)};
+  CloudSnapshot cloud_;
+};
+
+TEST_F(LazyTiles, AnswersAgainstBruteForce) {
   test::Rng rng(71);
-  std::shared_ptr<RobotModel> model;
-  Ingest ingest(test::whole_cloud(false));
-  CloudSnapshot cloud;
-  QueryConfig config;
-  config.max_distance = 5.0;
-  config.tolerance = 0.0;
   for (int i = 0; i < 12; ++i) {
     const Scene scene(&rng);
-    if (!model) model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
-    ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
-    ProximityQuery query(model, config);
-    std::vector<LinkProximity> links;
-    ASSERT_TRUE(query.run(scene.X_FL, {true, true, true}, {&cloud}, &links));
+    see(scene);
+    const std::vector<LinkProximity> links = scene.answers(cloud_);
     for (std::size_t k = 0; k < links.size(); ++k) {
       EXPECT_NEAR(links[k].distance, scene.truth(k), 2e-6) << "scene " << i << ", link " << k;
     }
@@ -98,23 +110,17 @@ TEST(LazyTiles, AnswersAgainstBruteForce) {
 }
 
 // All threads begin when no tile is loaded.
-TEST(LazyTiles, ThreadsGetTheSameAnswers) {
+TEST_F(LazyTiles, ThreadsGetTheSameAnswers) {
   test::Rng rng(73);
   const Scene scene(&rng);
-  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
-  Ingest ingest(test::whole_cloud(false));
   std::vector<LinkProximity> first;
   for (int round = 0; round < 10; ++round) {
-    CloudSnapshot cloud;
-    ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
-    QueryConfig config;
-    config.tolerance = 0.0;
+    cloud_ = CloudSnapshot();
+    see(scene);
     std::vector<std::vector<LinkProximity>> answers(3);
     std::vector<std::thread> threads;
     for (std::vector<LinkProximity>& links : answers) {
-      threads.emplace_back([&] {
-        ProximityQuery(model, config).run(scene.X_FL, {true, true, true}, {&cloud}, &links);
-      });
+      threads.emplace_back([&] { links = scene.answers(cloud_); });
     }
     for (std::thread& thread : threads) thread.join();
     if (first.empty()) first = answers[0];
@@ -127,16 +133,14 @@ TEST(LazyTiles, ThreadsGetTheSameAnswers) {
 }
 
 // A copy does not need the message.
-TEST(LazyTiles, CopyHoldsAllPoints) {
+TEST_F(LazyTiles, CopyHoldsAllPoints) {
   test::Rng rng(75);
   const Scene scene(&rng);
-  Ingest ingest(test::whole_cloud(false));
-  CloudSnapshot cloud;
-  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
-  const CloudSnapshot copy = cloud;
-  const std::vector<PointTile> tiles = test::tiles_of(cloud.index);
+  see(scene);
+  const CloudSnapshot copy = cloud_;
+  const std::vector<PointTile> tiles = test::tiles_of(cloud_.index);
   ASSERT_EQ(copy.index.bvh().tile_count(), tiles.size());
-  EXPECT_EQ(copy.index.size(), cloud.index.size());
+  EXPECT_EQ(copy.index.size(), cloud_.index.size());
   scene.pixels->assign(scene.pixels->size(), 0.0F);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     PointTile scratch;
@@ -144,25 +148,23 @@ TEST(LazyTiles, CopyHoldsAllPoints) {
   }
 }
 
-TEST(LazyTiles, SnapshotKeepsItsMessageUntilTheNextOne) {
+TEST_F(LazyTiles, SnapshotKeepsItsMessageUntilTheNextOne) {
   test::Rng rng(74);
   std::weak_ptr<std::vector<float>> message;
-  Ingest ingest(test::whole_cloud(false));
-  CloudSnapshot cloud;
   {
     const Scene scene(&rng);
     message = scene.pixels;
-    ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+    see(scene);
   }
   EXPECT_FALSE(message.expired());
-  ingest.run(RawCloud(), Eigen::Isometry3d::Identity(), {}, 0.0, &cloud);
+  ingest_.run(RawCloud(), Eigen::Isometry3d::Identity(), {}, 0.0, &cloud_);
   EXPECT_TRUE(message.expired());
 }
 
 // One missing pixel in nearly every tile leaves few tiles to be read later: the message, which is
 // as large as all tiles, is not kept for them. Answers are those of brute force, and the bytes may
 // change.
-TEST(LazyTiles, MessageIsNotKeptForFewTiles) {
+TEST_F(LazyTiles, MessageIsNotKeptForFewTiles) {
   test::Rng rng(76);
   Scene scene(&rng);
   for (std::size_t tile = 0; tile < kWidth * kHeight / 16; ++tile) {
@@ -172,54 +174,43 @@ TEST(LazyTiles, MessageIsNotKeptForFewTiles) {
         std::numeric_limits<float>::quiet_NaN();
   }
   const std::weak_ptr<std::vector<float>> message = scene.pixels;
-  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
-  QueryConfig config;
-  config.max_distance = 5.0;
-  config.tolerance = 0.0;
-  CloudSnapshot cloud, loaded;
-  Ingest ingest(test::whole_cloud(false));
+  CloudSnapshot loaded;
   RawCloud not_owned = raw(scene.pixels);
   not_owned.owner = nullptr;
-  ingest.run(not_owned, scene.X_FS, {}, 0.0, &loaded);
-  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+  ingest_.run(not_owned, scene.X_FS, {}, 0.0, &loaded);
+  see(scene);
   std::vector<double> truth;
-  for (std::size_t k = 0; k < scene.meshes.size(); ++k) truth.push_back(scene.truth(k));
+  for (std::size_t k = 0; k < meshes().size(); ++k) truth.push_back(scene.truth(k));
   scene.pixels->assign(scene.pixels->size(), 0.0F);
   scene.pixels.reset();
   EXPECT_TRUE(message.expired());
   const std::vector<PointTile> expected = test::tiles_of(loaded.index);
-  ASSERT_EQ(cloud.index.bvh().tile_count(), expected.size());
+  ASSERT_EQ(cloud_.index.bvh().tile_count(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     PointTile scratch;
-    ASSERT_TRUE(cloud.index.bvh().is_loaded(i));
-    ASSERT_TRUE(test::same_points(cloud.index.bvh().tile(i, &scratch), expected[i]));
+    ASSERT_TRUE(cloud_.index.bvh().is_loaded(i));
+    ASSERT_TRUE(test::same_points(cloud_.index.bvh().tile(i, &scratch), expected[i]));
   }
-  ProximityQuery query(model, config);
-  std::vector<LinkProximity> links;
-  ASSERT_TRUE(query.run(scene.X_FL, {true, true, true}, {&cloud}, &links));
+  const std::vector<LinkProximity> links = scene.answers(cloud_);
   for (std::size_t k = 0; k < links.size(); ++k) EXPECT_NEAR(links[k].distance, truth[k], 2e-6);
 }
 
-TEST(LazyTiles, ClearedIndexLetsGoOfItsMessageAndIsEmpty) {
+TEST_F(LazyTiles, ClearedIndexLetsGoOfItsMessageAndIsEmpty) {
   test::Rng rng(77);
   Scene scene(&rng);
   const std::weak_ptr<std::vector<float>> message = scene.pixels;
-  CloudSnapshot cloud;
-  Ingest ingest(test::whole_cloud(false));
-  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
-  const std::size_t memory = cloud.index.memory();
+  see(scene);
+  const std::size_t memory = cloud_.index.memory();
   scene.pixels.reset();
   EXPECT_FALSE(message.expired());
-  cloud.index.clear();
+  cloud_.index.clear();
   EXPECT_TRUE(message.expired());
-  EXPECT_TRUE(cloud.index.empty());
-  EXPECT_EQ(cloud.index.size(), 0U);
-  EXPECT_EQ(cloud.index.memory(), memory) << "kept for the next cloud";
-  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
-  ProximityQuery query(model, {});
-  std::vector<LinkProximity> links;
-  ASSERT_TRUE(query.run(scene.X_FL, {true, true, true}, {&cloud}, &links));
-  for (const LinkProximity& link : links) EXPECT_EQ(link.state, LinkState::kClear);
+  EXPECT_TRUE(cloud_.index.empty());
+  EXPECT_EQ(cloud_.index.size(), 0U);
+  EXPECT_EQ(cloud_.index.memory(), memory) << "kept for the next cloud";
+  for (const LinkProximity& link : scene.answers(cloud_)) {
+    EXPECT_EQ(link.state, LinkState::kClear);
+  }
 }
 
 }  // namespace
