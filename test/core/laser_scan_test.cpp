@@ -152,30 +152,43 @@ TEST(LaserScan, RangeLimitsApplyToTheBeam) {
   EXPECT_EQ(snapshot.counts.used, 11U);
 }
 
-TEST(LaserScan, SelfFilterKnowsTheRobotAtEveryInstant) {
-  const auto model = test::make_model({Sphere{0.1}}, 0.005);
-  const std::vector<float> ranges(101, 1.0F);  // a half circle about the sensor
-  ScanPoints points;
-  to_points(scan_of(ranges), 0.0, 5.0, {}, &points);
-  const auto robot_at = [&](double x, double y) {
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-    X_FL.translation() << x, y, 0.0;
-    return PosedSolid{&model->links[0].tree, &model->links[0].solid, X_FL};
-  };
-  IngestConfig config = test::whole_cloud();
-  config.self_filter = true;
-  Ingest ingest(config);
-  CloudSnapshot first, both;
-  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  ingest.run(points.raw(), X_FS, {robot_at(1, 0)}, 0.0, &first);
-  ingest.run(points.raw(), X_FS, {robot_at(1, 0), robot_at(0, 1)}, 0.0, &both);
-  const auto kept = by_beam(both, ranges.size());
+// A robot of a sphere, and a scan of a half circle about the sensor.
+class SelfFilterOfAScan : public ::testing::Test {
+ protected:
+  static constexpr std::size_t kBeams = 101;
+
+  SelfFilterOfAScan() {
+    config_.self_filter = true;
+    to_points(scan_of(ranges_), 0.0, 5.0, {}, &points_);
+  }
+  PosedSolid robot_at(const Eigen::Vector3d& p) const {
+    return {&model_->links[0].tree, &model_->links[0].solid,
+            Eigen::Isometry3d(Eigen::Translation3d(p))};
+  }
+  CloudSnapshot filtered(const RawCloud& cloud, const std::vector<PosedSolid>& robot) const {
+    CloudSnapshot snapshot;
+    Ingest(config_).run(cloud, Eigen::Isometry3d::Identity(), robot, 0.0, &snapshot);
+    return snapshot;
+  }
+  static bool is_on(const Eigen::Vector3d& robot, std::size_t beam) {
+    const double angle = -1.5 + 0.03 * static_cast<double>(beam);
+    return (Eigen::Vector3d(std::cos(angle), std::sin(angle), 0) - robot).norm() <= 0.12;
+  }
+
+  const std::shared_ptr<const RobotModel> model_ = test::make_model({Sphere{0.1}}, 0.005);
+  const std::vector<float> ranges_ = std::vector<float>(kBeams, 1.0F);
+  const Eigen::Vector3d ahead_ = Eigen::Vector3d::UnitX(), aside_ = Eigen::Vector3d::UnitY();
+  IngestConfig config_ = test::whole_cloud();
+  ScanPoints points_;
+};
+
+TEST_F(SelfFilterOfAScan, KnowsTheRobotAtEveryInstant) {
+  const CloudSnapshot first = filtered(points_.raw(), {robot_at(ahead_)}),
+                      both = filtered(points_.raw(), {robot_at(ahead_), robot_at(aside_)});
+  const auto kept = by_beam(both, kBeams);
   std::uint32_t on_robot = 0;
   for (std::size_t i = 0; i < kept.size(); ++i) {
-    const double angle = -1.5 + 0.03 * static_cast<double>(i);
-    const Eigen::Vector3d p(std::cos(angle), std::sin(angle), 0);
-    const bool expected = (p - Eigen::Vector3d::UnitX()).norm() <= 0.12 ||
-                          (p - Eigen::Vector3d::UnitY()).norm() <= 0.12;
+    const bool expected = is_on(ahead_, i) || is_on(aside_, i);
     EXPECT_EQ(kept[i].array().isNaN().all(), expected) << i;
     on_robot += expected ? 1 : 0;
   }
@@ -185,46 +198,28 @@ TEST(LaserScan, SelfFilterKnowsTheRobotAtEveryInstant) {
 
 // A beam is compared with where the robot was when it was measured. An obstacle is no point on the
 // robot because a link is there at another time of the scan.
-TEST(LaserScan, SelfFilterComparesABeamWithTheRobotOfItsTime) {
-  const auto model = test::make_model({Sphere{0.1}}, 0.005);
-  const std::vector<float> ranges(101, 1.0F);
-  ScanPoints points;
-  to_points(scan_of(ranges), 0.0, 5.0, {}, &points);
-  IngestConfig config = test::whole_cloud();
-  config.self_filter = true;
-  Ingest ingest(config);
-  PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
-  solid.X_FL.translation().x() = 1.0;
-  for (const auto& [first, last] : {std::pair<int, int>{0, 100}, {0, 50}, {51, 100}, {48, 49}}) {
-    solid.first_point = static_cast<std::uint32_t>(first);
-    solid.last_point = static_cast<std::uint32_t>(last);
-    CloudSnapshot snapshot;
-    ingest.run(points.raw(), Eigen::Isometry3d::Identity(), {solid}, 0.0, &snapshot);
-    const auto kept = by_beam(snapshot, ranges.size());
-    for (int i = 0; i < 101; ++i) {
-      const double angle = -1.5 + 0.03 * i;
-      const Eigen::Vector3d p(std::cos(angle), std::sin(angle), 0);
-      const bool expected =
-          (p - Eigen::Vector3d::UnitX()).norm() <= 0.12 && i >= first && i <= last;
-      EXPECT_EQ(kept[static_cast<std::size_t>(i)].array().isNaN().all(), expected) << i;
+TEST_F(SelfFilterOfAScan, ComparesABeamWithTheRobotOfItsTime) {
+  PosedSolid solid = robot_at(ahead_);
+  using Beams = std::pair<std::uint32_t, std::uint32_t>;
+  for (const auto& [first, last] : {Beams{0, 100}, {0, 50}, {51, 100}, {48, 49}}) {
+    solid.first_point = first;
+    solid.last_point = last;
+    const auto kept = by_beam(filtered(points_.raw(), {solid}), kBeams);
+    for (std::size_t i = 0; i < kBeams; ++i) {
+      EXPECT_EQ(kept[i].array().isNaN().all(), is_on(ahead_, i) && i >= first && i <= last) << i;
     }
   }
 }
 
 // Points of one tile, all of them deep inside where the link was, for half of them at another time.
-TEST(LaserScan, SelfFilterDividesATileByTime) {
-  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+TEST_F(SelfFilterOfAScan, DividesATileByTime) {
   std::vector<Eigen::Vector3f> points;
   for (int i = 0; i < 16; ++i) points.emplace_back(1.0F + 1e-4F * i, 0.0F, 0.0F);
   const RawCloud raw = packed_cloud(points.data()->data(), points.size(), 1);
-  IngestConfig config = test::whole_cloud();
-  config.self_filter = true;
-  PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
-  solid.X_FL.translation().x() = 1.0;
+  PosedSolid solid = robot_at(ahead_);
   for (const int last : {0, 7, 14, 15}) {
     solid.last_point = static_cast<std::uint32_t>(last);
-    CloudSnapshot snapshot;
-    Ingest(config).run(raw, Eigen::Isometry3d::Identity(), {solid}, 0.0, &snapshot);
+    const CloudSnapshot snapshot = filtered(raw, {solid});
     EXPECT_EQ(snapshot.counts.on_robot, static_cast<std::uint32_t>(last + 1));
     EXPECT_EQ(snapshot.index.size(), points.size() - static_cast<std::size_t>(last + 1));
   }
