@@ -25,20 +25,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-using test::BoxTruth;
-using test::expect_truth;
-using test::in_a_box;
-using test::sampled_depth;
-using test::truth_of;
-
-TriangleMesh one_triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                          const Eigen::Vector3d& c) {
-  TriangleMesh mesh;
-  mesh.vertices = {a, b, c};
-  mesh.triangles = {{0, 1, 2}};
-  return mesh;
-}
-
 TEST(BoxDistance, TrianglesOfEveryKind) {
   test::Rng rng(31);
   int touching = 0, apart = 0;
@@ -71,7 +57,7 @@ TEST(BoxDistance, TrianglesOfEveryKind) {
     }
     const BoxDistance found = triangle_to_box(a, b, c, box);
     const double truth =
-        test::BoxOracle(one_triangle(a, b, c)).distance({box, Eigen::Isometry3d::Identity()});
+        test::BoxOracle({{a, b, c}, {{0, 1, 2}}}).distance({box, Eigen::Isometry3d::Identity()});
     ASSERT_NEAR(found.distance, truth, 1e-7 * (1.0 + size)) << i;
     ASSERT_NEAR((found.p_OS - found.p_OB).norm(), found.distance, 1e-12);
     ASSERT_LT(box.exteriorDistance(found.p_OB), 1e-12);
@@ -80,13 +66,6 @@ TEST(BoxDistance, TrianglesOfEveryKind) {
   }
   EXPECT_GT(touching, test::scaled(1000));
   EXPECT_GT(apart, test::scaled(1000));
-}
-
-std::vector<Eigen::AlignedBox3d> random_leaves(test::Rng* rng, int count, double space,
-                                               double resolution, int levels) {
-  std::vector<Eigen::AlignedBox3d> boxes(static_cast<std::size_t>(count));
-  for (Eigen::AlignedBox3d& box : boxes) box = test::random_leaf(rng, space, resolution, levels);
-  return boxes;
 }
 
 std::vector<TriangleMesh> link_meshes() {
@@ -112,7 +91,7 @@ TEST_P(Boxes, AgainstOracle) {
   const int scenes = test::scaled(tolerance == 0.0 ? 500 : 100);
   for (int scene = 0; scene < scenes; ++scene) {
     const std::vector<Eigen::AlignedBox3d> boxes =
-        random_leaves(&rng, 1 + scene % 25, 0.5, 0.02, 4);
+        test::random_leaves(&rng, 1 + scene % 25, 0.5, 0.02, 4);
     const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.3));
     for (int step = 0; step < 4; ++step) {  // later steps have a warm start
       for (Eigen::Isometry3d& X : X_FL) {
@@ -123,15 +102,15 @@ TEST_P(Boxes, AgainstOracle) {
       for (std::size_t i = 0; i < meshes.size(); ++i, ++cases) {
         SCOPED_TRACE("scene " + std::to_string(scene) + " step " + std::to_string(step) + " link " +
                      std::to_string(i));
-        const BoxTruth truth = truth_of(meshes[i], map, X_FL[i]);
+        const test::BoxTruth truth = test::truth_of(meshes[i], map, X_FL[i]);
         const LinkProximity& result = results[i];
-        ASSERT_NO_FATAL_FAILURE(expect_truth(result, truth, meshes[i], map, X_FL[i], config));
+        ASSERT_NO_FATAL_FAILURE(test::expect_truth(result, truth, meshes[i], map, X_FL[i], config));
         clear += result.state == LinkState::kClear;
         near += result.state == LinkState::kNear;
         if (result.state != LinkState::kContact) continue;
         ++contact;
         if (cases % 10 == 0) {
-          ASSERT_LE(result.lower_bound, sampled_depth(&rng, meshes[i], map, X_FL[i], 200));
+          ASSERT_LE(result.lower_bound, test::sampled_depth(&rng, meshes[i], map, X_FL[i], 200));
         }
       }
     }
@@ -148,16 +127,14 @@ TEST(Boxes, EveryKindOfLink) {
   test::Rng rng(35);
   const std::vector<LinkGeometry> links = test::random_links(&rng);
   const auto model = test::model_of(links, 0.01);
-  std::vector<Solid> solids;
-  solids.reserve(links.size());
-  for (const LinkGeometry& link : links) solids.emplace_back(link);
+  const std::vector<Solid> solids(links.begin(), links.end());
   QueryConfig config;
   config.tolerance = 0.0;
   ProximityQuery query(model, config);
   std::vector<LinkProximity> results;
   const std::vector<bool> known(links.size(), true);
   for (int scene = 0; scene < test::scaled(150); ++scene) {
-    const std::vector<Eigen::AlignedBox3d> boxes = random_leaves(&rng, 4, 0.3, 0.01, 5);
+    const std::vector<Eigen::AlignedBox3d> boxes = test::random_leaves(&rng, 4, 0.3, 0.01, 5);
     const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.2));
     const std::vector<Eigen::Isometry3d> X_FL(links.size(), test::random_pose(&rng, 0.1));
     query.run(X_FL, known, {&map}, &results);
@@ -167,7 +144,7 @@ TEST(Boxes, EveryKindOfLink) {
       ASSERT_GE(result.state, LinkState::kNear);
       ASSERT_NEAR(result.direction.norm(), 1.0, 1e-9);
       ASSERT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
-      ASSERT_TRUE(in_a_box(map, result.p_FCo));
+      ASSERT_TRUE(test::in_a_box(map, result.p_FCo));
       const Eigen::Isometry3d X_LM = X_FL[i].inverse() * map.X_FM;
       ASSERT_NEAR(solids[i].signed_distance(X_FL[i].inverse() * result.p_FCo).distance,
                   result.distance, 1e-7);
@@ -263,8 +240,7 @@ Overlap overlap_of(const Eigen::Vector3d& half_A, const Eigen::Isometry3d& X_BA,
 // were 278 such answers, 110 of them with overlaps of more than 10 um and up to 0.5 mm.
 TEST(Boxes, SmallOverlapsAreContact) {
   const Eigen::Vector3d half_A(0.05, 0.03, 0.02), half_B(0.04, 0.06, 0.025);
-  const std::vector<TriangleMesh> meshes = {test::box(2.0 * half_A)};
-  const auto as_mesh = test::make_model({meshes.begin(), meshes.end()}, 0.005);
+  const auto as_mesh = test::make_model({Shape(test::box(2.0 * half_A))}, 0.005);
   const auto as_box = test::make_model({Box{2.0 * half_A}}, 0.005);
   const CloudSnapshot map = test::make_map({{-half_B, half_B}});
   test::Rng rng(77);
@@ -326,11 +302,10 @@ TEST(Boxes, PointsAndMapsTogether) {
   const std::vector<Eigen::Isometry3d> X_FL(1, Eigen::Isometry3d::Identity());
   std::vector<LinkProximity> results;
   const CloudSnapshot cloud = test::make_snapshot({{0.5, 0, 0}});
-  const CloudSnapshot near =
-      test::make_map({{Eigen::Vector3d(-1, 0.3, -1), Eigen::Vector3d(1, 2, 1)}});
-  const CloudSnapshot far =
-      test::make_map({{Eigen::Vector3d(-1, 0.8, -1), Eigen::Vector3d(1, 2, 1)}});
-  const CloudSnapshot nothing = test::make_map({});
+  const auto map_from = [](double y) {
+    return test::make_map({{Eigen::Vector3d(-1, y, -1), Eigen::Vector3d(1, 2, 1)}});
+  };
+  const CloudSnapshot near = map_from(0.3), far = map_from(0.8), nothing = test::make_map({});
   query.run(X_FL, {true}, {&cloud, &near}, &results);
   EXPECT_NEAR(results[0].distance, 0.2, 1e-6);
   EXPECT_EQ(results[0].source, 1);
@@ -385,7 +360,7 @@ TEST(Boxes, BoundsHoldWheneverTheDeadlinePasses) {
   std::vector<LinkProximity> results, whole;
   int unfinished = 0;
   for (int i = 0; i < test::scaled(200); ++i) {
-    const std::vector<Eigen::AlignedBox3d> boxes = random_leaves(&rng, 1500, 1.0, 0.01, 3);
+    const std::vector<Eigen::AlignedBox3d> boxes = test::random_leaves(&rng, 1500, 1.0, 0.01, 3);
     const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.3));
     for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.5);
     config.deadline = 1e-6 * std::pow(10.0, test::uniform(&rng, 0.0, 3.5));

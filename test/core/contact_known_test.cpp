@@ -6,12 +6,12 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
-#include <memory>
 #include <vector>
 
 #include "internal/cloud/point_bvh.h"
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/contact/contact_volume.h"
+#include "support/box_oracle.h"
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
@@ -78,16 +78,14 @@ Points patch(test::Rng* rng, std::size_t count, double size, double noise) {
   return points;
 }
 
-std::shared_ptr<const BoxIndex> random_map(test::Rng* rng) {
+CloudSnapshot random_map(test::Rng* rng) {
   std::vector<Eigen::AlignedBox3d> boxes;
   for (int i = 0; i < 40; ++i) {
     const Eigen::Vector3d corner = test::random_vector(rng, 0.15);
     const double size = std::pow(10.0, test::uniform(rng, -2.5, -0.8));
     boxes.emplace_back(corner, Eigen::Vector3d(corner.array() + size));
   }
-  auto index = std::make_shared<BoxIndex>();
-  index->build(boxes);
-  return index;
+  return test::make_map(boxes);
 }
 
 TEST(ContactKnown, NoMoreThanIsSummedOfCloudsAndMaps) {
@@ -98,7 +96,7 @@ TEST(ContactKnown, NoMoreThanIsSummedOfCloudsAndMaps) {
     const double cell = test::uniform(&rng, 0.004, 0.03);
     CloudSnapshot first = test::thinned(patch(&rng, 3000, 0.2, 0.05), cell);
     CloudSnapshot second = test::thinned(patch(&rng, 500, 0.1, 0.0), 0.01);
-    if (seed % 3 == 0) first.boxes = random_map(&rng);
+    if (seed % 3 == 0) first.boxes = random_map(&rng).boxes;
     const Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.05);
     const bool is_fresh = seed % 2 == 0;
     const Stopped stopped = stop_everywhere(
@@ -136,8 +134,7 @@ TEST(ContactKnown, NoMoreThanIsSummedOfBalls) {
   const auto balls = [](int count, double radius) {
     LinkGeometry geometry;
     for (int i = 0; i < count; ++i) {
-      Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-      X.translation() = Eigen::Vector3d(0.1 * (i % 4), 0.1 * (i / 4), 0.0);
+      const Eigen::Isometry3d X(Eigen::Translation3d(0.1 * (i % 4), 0.1 * (i / 4), 0.0));
       geometry.push_back({Sphere{radius}, X, ""});
     }
     return geometry;

@@ -1,11 +1,8 @@
 // Every instruction set of this machine gives the same answers.
 
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
-#include <hwy/targets.h>
 
 #include <cmath>
-#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -23,34 +20,18 @@
 namespace ist {
 namespace {
 
-std::vector<std::int64_t> machine_targets() {
-  test::choose_instruction_sets(0);
-  std::vector<std::int64_t> targets;
-  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
-    targets.push_back(left & -left);
-  }
-  return targets;
-}
-
-class InstructionSets : public ::testing::Test {
- protected:
-  void TearDown() override { test::choose_instruction_sets(0); }
-};
-
-TEST_F(InstructionSets, SameGeometry) {
+TEST(InstructionSets, SameGeometry) {
   test::Rng rng(81);
   const TriangleMesh mesh = test::torus(0.1, 0.03, 24, 12);
   const TriangleBvh bvh(mesh);
   for (int i = 0; i < test::scaled(2000); ++i) {
     const Eigen::Vector3d p = test::random_vector(&rng, i % 2 == 0 ? 0.15 : 1.0);
     const double distance = test::oracle_distance(mesh, p), w = test::oracle_winding(mesh, p);
-    for (const std::int64_t target : machine_targets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      test::choose_instruction_sets(target);
+    test::for_each_instruction_set([&] {
       ASSERT_NEAR(std::sqrt(bvh.closest(p).distance_sq), distance, 1e-12);
       ASSERT_NEAR(bvh.winding_number(p), w, 0.01);
       ASSERT_NEAR(bvh.quick_winding_number(p), w, TriangleBvh::kQuickWindingError);
-    }
+    });
   }
 }
 
@@ -65,30 +46,28 @@ void expect_same(const LinkProximity& result, const LinkProximity& first, double
 }
 
 // Runs the same query with each instruction set; `results` are the last one's.
-void expect_same_answers(const std::vector<std::int64_t>& targets,
-                         const std::shared_ptr<const RobotModel>& model, const QueryConfig& config,
+void expect_same_answers(const std::shared_ptr<const RobotModel>& model, const QueryConfig& config,
                          const std::vector<Eigen::Isometry3d>& X_FL, const CloudSnapshot& cloud,
                          std::vector<LinkProximity>* results) {
   const std::vector<bool> known(X_FL.size(), true);
   std::vector<LinkProximity> first;
-  for (const std::int64_t target : targets) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    test::choose_instruction_sets(target);
+  int sets = 0;
+  test::for_each_instruction_set([&] {
+    ++sets;
     ASSERT_TRUE(ProximityQuery(model, config).run(X_FL, known, {&cloud}, results));
     if (first.empty()) first = *results;
     for (std::size_t i = 0; i < X_FL.size(); ++i) {
       SCOPED_TRACE("link " + std::to_string(i));
       ASSERT_NO_FATAL_FAILURE(expect_same((*results)[i], first[i], config.tolerance, X_FL[i]));
     }
-  }
+  });
+  EXPECT_GT(sets, 1);
 }
 
-TEST_F(InstructionSets, SameAnswers) {
+TEST(InstructionSets, SameAnswers) {
   test::Rng rng(82);
   const std::vector<LinkGeometry> links = test::random_links(&rng);
   const auto model = test::model_of(links, 0.01);
-  const std::vector<std::int64_t> targets = machine_targets();
-  EXPECT_GT(targets.size(), 1U);
   for (int scene = 0; scene < test::scaled(100); ++scene) {
     const std::vector<Eigen::Vector3d> points = test::random_points(
         &rng, links[static_cast<std::size_t>(scene) % links.size()], 1 + scene % 100);
@@ -98,7 +77,7 @@ TEST_F(InstructionSets, SameAnswers) {
       QueryConfig config;
       config.tolerance = tolerance;
       std::vector<LinkProximity> results;
-      ASSERT_NO_FATAL_FAILURE(expect_same_answers(targets, model, config, X_FL, cloud, &results));
+      ASSERT_NO_FATAL_FAILURE(expect_same_answers(model, config, X_FL, cloud, &results));
       if (scene % 10 != 0) continue;
       for (std::size_t i = 0; i < links.size(); ++i) {
         test::expect_truth(results[i], test::truth_of(links[i], X_FL[i], points, cloud), config,
@@ -108,7 +87,7 @@ TEST_F(InstructionSets, SameAnswers) {
   }
 }
 
-TEST_F(InstructionSets, SameDistancesToBoxes) {
+TEST(InstructionSets, SameDistancesToBoxes) {
   test::Rng rng(83);
   const std::vector<LinkGeometry> links = test::random_links(&rng);
   const auto model = test::model_of(links, 0.01);
@@ -117,14 +96,11 @@ TEST_F(InstructionSets, SameDistancesToBoxes) {
   config.tolerance = 0.0;
   int near = 0;
   for (int scene = 0; scene < test::scaled(100); ++scene) {
-    std::vector<Eigen::AlignedBox3d> boxes(static_cast<std::size_t>(1 + scene));
-    for (Eigen::AlignedBox3d& box : boxes) box = test::random_leaf(&rng, 0.8, 0.02, 4);
+    const auto boxes = test::random_leaves(&rng, 1 + scene, 0.8, 0.02, 4);
     const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.2));
     const std::vector<Eigen::Isometry3d> X_FL(links.size(), test::random_pose(&rng, 0.3));
     std::vector<LinkProximity> first, results;
-    for (const std::int64_t target : machine_targets()) {
-      SCOPED_TRACE(hwy::TargetName(target));
-      test::choose_instruction_sets(target);
+    test::for_each_instruction_set([&] {
       ASSERT_TRUE(ProximityQuery(model, config).run(X_FL, known, {&map}, &results));
       if (first.empty()) first = results;
       for (std::size_t i = 0; i < links.size(); ++i) {
@@ -133,12 +109,12 @@ TEST_F(InstructionSets, SameDistancesToBoxes) {
         ASSERT_NEAR(results[i].distance, first[i].distance, 4e-8);
         ++near;
       }
-    }
+    });
   }
   EXPECT_GT(near, 10);
 }
 
-TEST_F(InstructionSets, SameRepulsion) {
+TEST(InstructionSets, SameRepulsion) {
   test::Rng rng(84);
   const std::vector<LinkGeometry> links = test::random_links(&rng);
   const auto model = test::model_of(links, 0.01);
@@ -155,22 +131,18 @@ TEST_F(InstructionSets, SameRepulsion) {
       cloud = test::make_snapshot(points);
       cloud.index.bvh().set_thinning(cloud.thinning);
     } else {
-      std::vector<Eigen::AlignedBox3d> boxes(static_cast<std::size_t>(1 + scene));
-      for (Eigen::AlignedBox3d& box : boxes) box = test::random_leaf(&rng, 0.8, 0.02, 4);
+      const auto boxes = test::random_leaves(&rng, 1 + scene, 0.8, 0.02, 4);
       cloud = test::make_map(boxes, test::random_pose(&rng, 0.2));
     }
     const Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.3);
     for (std::size_t i = 0; i < links.size(); ++i) {
-      test::choose_instruction_sets(0);
       const RepulsiveWrench first = repulsion.wrench(i, X_FL, {&cloud}, proximity, {});
       ASSERT_TRUE(first.force.allFinite());
-      for (const std::int64_t target : machine_targets()) {
-        SCOPED_TRACE(hwy::TargetName(target));
-        test::choose_instruction_sets(target);
+      test::for_each_instruction_set([&] {
         const RepulsiveWrench push = repulsion.wrench(i, X_FL, {&cloud}, proximity, {});
         ASSERT_LT((push.force - first.force).norm(), 1e-4);
         ASSERT_LT((push.torque - first.torque).norm(), 1e-4);
-      }
+      });
     }
   }
 }

@@ -41,4 +41,11 @@ Eigen::AlignedBox3d random_leaf(Rng* rng, double space, double resolution, int l
   return {low, low + Eigen::Vector3d::Constant(size)};
 }
 
+std::vector<Eigen::AlignedBox3d> random_leaves(Rng* rng, int count, double space, double resolution,
+                                               int levels) {
+  std::vector<Eigen::AlignedBox3d> boxes(static_cast<std::size_t>(count));
+  for (Eigen::AlignedBox3d& box : boxes) box = random_leaf(rng, space, resolution, levels);
+  return boxes;
+}
+
 }  // namespace ist::test

@@ -35,5 +35,7 @@ CloudSnapshot make_map(const std::vector<Eigen::AlignedBox3d>& boxes_M,
 
 /// A cube on an octree's grid: its size is the resolution times a power of two.
 Eigen::AlignedBox3d random_leaf(Rng* rng, double space, double resolution, int levels);
+std::vector<Eigen::AlignedBox3d> random_leaves(Rng* rng, int count, double space, double resolution,
+                                               int levels);
 
 }  // namespace ist::test
