@@ -6,12 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <vector>
 
 #include "internal/geometry/solid_queries.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "support/accuracy.h"
 #include "support/demo_arm.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
@@ -35,15 +34,6 @@ std::vector<fs::path> fields_in(const fs::path& folder) {
     if (file.path().extension() == ".istfield") found.push_back(file.path());
   }
   return found;
-}
-
-std::string content(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-void write(const fs::path& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary) << bytes;
 }
 
 std::vector<LinkGeometry> geometries() {
@@ -93,13 +83,13 @@ TEST_F(FieldCacheTest, damagedFilesAreNotUsed) {
   const std::string key = field_key(geometry);
   cache_.store(key, DistanceField(solid), &warning_);
   const fs::path file = fields_in(dir_.path()).at(0);
-  const std::string whole = content(file);
+  const std::string whole = test::read_text(file.string());
   for (std::size_t i = 0; i < 100; ++i) {
     std::string bytes = whole;
     const std::size_t at = i * (whole.size() - 1) / 99;
     bytes[at] = static_cast<char>(bytes[at] ^ 4);
     for (const std::string& damaged : {bytes, whole.substr(0, at)}) {
-      write(file, damaged);
+      dir_.write(file.filename().string(), damaged);
       warning_.clear();
       EXPECT_EQ(cache_.load(key, solid, &warning_), nullptr) << at;
       EXPECT_NE(warning_.find(file.string()), std::string::npos) << warning_;
@@ -143,7 +133,7 @@ TEST_F(FieldCacheTest, robotsReadTheirFieldsAgain) {
   expect_same(*make());
   EXPECT_EQ(fs::last_write_time(files[0]), time) << "it was read";
   EXPECT_TRUE(warnings.empty()) << warnings[0];
-  write(files[0], "no field");
+  dir_.write(files[0].filename().string(), "no field");
   expect_same(*make());
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find(files[0].filename().string()), std::string::npos) << warnings[0];

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <sstream>
 #include <string>
 
 #include "internal/geometry/mesh_io.h"
@@ -18,9 +17,12 @@
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "support/accuracy.h"
 #include "support/errors.h"
 #include "support/mesh_files.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
+#include "support/robot_of_links.h"
 #include "support/temp_dir.h"
 
 namespace ist {
@@ -38,12 +40,6 @@ const double kTooLarge[] = {1.0001e4,
 using test::error_of;
 using test::expect_says;
 
-std::string number(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
-
 RobotDescription parse(const std::string& collision, const std::string& joint = "") {
   return parse_urdf(
       "<robot name='r'><link name='base'>" + collision + "</link>" + joint + "</robot>",
@@ -52,7 +48,7 @@ RobotDescription parse(const std::string& collision, const std::string& joint = 
 
 TEST(Limits, ShapesOfAUrdfAreRefusedWithTheirNumbers) {
   for (const double size : kTooLarge) {
-    const std::string s = number(size);
+    const std::string s = test::number(size);
     if (!std::isfinite(size)) continue;  // urdfdom refuses those words itself
     for (const std::string& shape :
          {"<box size='1 " + s + " 1'/>", "<cylinder radius='1' length='" + s + "'/>",
@@ -131,18 +127,11 @@ TEST(Limits, ShapesGivenToTheLibraryAreRefused) {
     for (const Shape& shape : shapes) {
       // A mesh box reaches half its size to each side.
       if (std::holds_alternative<TriangleMesh>(shape) && size < 2e4) continue;
-      GeometryElement element;
-      element.shape = shape;
-      element.source = "test";
+      const GeometryElement element{shape, Eigen::Isometry3d::Identity(), "test"};
       EXPECT_THROW(pack_element(shape, {}), ModelError) << size;
       EXPECT_THROW(Solid({element}), ModelError) << size;
-      RobotDescription robot;
-      robot.links.emplace_back();
-      robot.links[0].name = "arm";
-      robot.links[0].geometry = {element};
-      robot.link_order = {"arm"};
-      const auto model = build_robot_model(robot, {});
-      expect_says(model->links[0].error, "link 'arm', element 'test': ");
+      const auto model = build_robot_model(test::robot_of({{element}}), {});
+      expect_says(model->links[0].error, "link 'link0', element 'test': ");
     }
   }
 }
@@ -158,9 +147,7 @@ TEST(Limits, SizesWithinTheLimitsAreMeasured) {
                                Shape(Cylinder{0.5 * size, size}), Shape(Sphere{0.5 * size})}) {
       const Packing packing = pack_element(shape, config);
       EXPECT_FALSE(packing.spheres.empty());
-      GeometryElement element;
-      element.shape = shape;
-      const Solid solid({element});
+      const Solid solid(test::one(shape));
       EXPECT_NEAR(solid.signed_distance({0.0, 0.0, size}).distance, 0.5 * size, 1e-9 * size);
       if (size > 1e-9) {
         EXPECT_TRUE(solid.is_inside({0.1 * size, 0.1 * size, 0.1 * size}));
