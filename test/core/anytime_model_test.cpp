@@ -159,16 +159,6 @@ TEST(AnytimeModel, aFineFieldTakesThePlaceOfACoarseOne) {
   EXPECT_EQ(field_of(fine->with_packings_of(*coarse)), field_of(fine));
 }
 
-TEST(AnytimeModel, fieldsOfAllLinksAreMeasuredWhereTheyAreAskedFor) {
-  const std::vector<LinkGeometry> links = {test::one(Sphere{0.1}), test::one(Box{{0.1, 0.2, 0.3}})};
-  RobotModelConfig config = config_to(kMaxError);
-  config.distance_fields = true;
-  const auto with_fields = build_robot_model(*robot_of(links), config);
-  for (const LinkModel& link : with_fields->links) EXPECT_NE(link.field, nullptr);
-  const auto without_fields = build_robot_model(*robot_of(links), config_to(kMaxError));
-  for (const LinkModel& link : without_fields->links) EXPECT_EQ(link.field, nullptr);
-}
-
 // Only final packings are kept, and a start with a full cache has them at once.
 TEST(AnytimeModel, keepsFinalPackingsInTheCache) {
   const test::TempDir dir;
