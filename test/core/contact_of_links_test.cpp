@@ -33,9 +33,7 @@ using test::one;
 constexpr double kPi = 3.14159265358979323846;
 
 Eigen::Isometry3d at(const Eigen::Vector3d& p) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.translation() = p;
-  return X;
+  return Eigen::Isometry3d(Eigen::Translation3d(p));
 }
 
 // Two balls: the lens of the balls themselves, and a force along the line of the centres, without a
@@ -45,8 +43,7 @@ TEST(ContactOfLinks, BallsShareTheirLens) {
   const ContactLink a(one(Sphere{R})), b(one(Sphere{r}));
   for (const double depth : {0.005, 0.01, 0.02, 0.04, 0.08}) {
     const double d = R + r - depth;
-    const double lens =
-        kPi * depth * depth * (d * d + 2 * d * (R + r) - 3 * (R - r) * (R - r)) / (12.0 * d);
+    const double lens = test::oracle_lens(R, r, d);
     const Eigen::Vector3d along = Eigen::Vector3d(1, 2, 2) / 3.0;
     const ContactVolume found = contact_volume(*a.body, *b.body, at(d * along));
     EXPECT_NEAR(found.volume / lens, 1.0, 0.02) << depth;
@@ -240,8 +237,7 @@ TEST(ContactDepth, EqualsTheTruthInEveryContact) {
   const std::vector<LinkTruth> meshes = panda_meshes(*data);
   const auto model = test::panda_model(*data, 0.005);
   const std::vector<bool> known(test::kPandaLinks, true);
-  std::size_t contacts = 0, checked = 0, wrong = 0;
-  double largest_error = 0.0;
+  std::size_t contacts = 0, checked = 0;
   for (const char* name : {"mosd0", "mosd10", "mosd40"}) {
     const CloudSnapshot cloud = test::truth_cloud(*data, name);
     const std::vector<Eigen::Vector3d> points = test::stored_points(cloud.index);
@@ -262,12 +258,10 @@ TEST(ContactDepth, EqualsTheTruthInEveryContact) {
           SCOPED_TRACE(::testing::Message() << name << " " << motion << " " << c << " link " << i);
           ++contacts;
           const double truth = deepest(meshes[i], X_FL[i], points, &checked);
-          const double error = std::abs(results[i].distance - truth);
-          largest_error = std::max(largest_error, error);
-          if (error > 1e-5) ++wrong;
-          EXPECT_LE(error, 1e-5);
-          EXPECT_LE(results[i].lower_bound, truth + (std::abs(truth) < 2e-8 ? 2e-8 : 0.0));
-          EXPECT_LE(coarse_results[i].lower_bound, truth + (std::abs(truth) < 2e-8 ? 2e-8 : 0.0));
+          const double rounding = std::abs(truth) < 2e-8 ? 2e-8 : 0.0;
+          EXPECT_NEAR(results[i].distance, truth, 1e-5);
+          EXPECT_LE(results[i].lower_bound, truth + rounding);
+          EXPECT_LE(coarse_results[i].lower_bound, truth + rounding);
           EXPECT_GE(coarse_results[i].distance, truth - 1e-9);
           test::expect_witness(results[i], X_FL[i]);
         }
@@ -275,7 +269,6 @@ TEST(ContactDepth, EqualsTheTruthInEveryContact) {
     }
   }
   EXPECT_GT(contacts, test::kSanitized ? 30U : 600U);
-  EXPECT_EQ(wrong, 0U) << "largest error " << largest_error << " of " << contacts << " contacts";
 }
 
 }  // namespace
