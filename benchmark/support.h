@@ -64,13 +64,7 @@ class CommandLine : public CLI::App {
   int publish(const std::string& name, const std::string& table) const {
     std::printf("%s", table.c_str());
     std::fflush(stdout);
-    if (document_.empty()) return 0;
-    std::string all = test::read_text(document_);
-    const auto [first, last] = test::table_place(all, name);
-    if (last != 0) {
-      all.replace(first, last - first, table);
-      if (std::ofstream(document_) << all) return 0;
-    }
+    if (document_.empty() || test::replace_table(document_, name, table)) return 0;
     std::fprintf(stderr, "%s cannot be written, or lacks the marks of '%s'\n", document_.c_str(),
                  name.c_str());
     return 1;

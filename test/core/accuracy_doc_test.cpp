@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 #include <set>
 #include <string>
@@ -103,8 +102,7 @@ void measure_robot(const std::filesystem::path& data, Measured* measured) {
 void measure_hard_cases(Measured* exact, Measured* coarse) {
   for (const test::HardScene& scene : test::hard_scenes()) {
     const auto model = test::model_of(scene.links, 0.005);
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-    X_FL.translation() = scene.far;
+    const Eigen::Isometry3d X_FL(Eigen::Translation3d{scene.far});
     const std::vector<Eigen::Isometry3d> poses(scene.links.size(), X_FL);
     const std::vector<bool> known(scene.links.size(), true);
     std::vector<LinkProximity> results;
@@ -156,14 +154,6 @@ std::string hard_table(const Measured& exact, Measured coarse) {
   return text;
 }
 
-void write_table(const std::string& name, const std::string& table) {
-  std::string text = test::read_text(kDocument);
-  const auto [first, last] = test::table_place(text, name);
-  ASSERT_GT(last, 0U) << kDocument << " lacks the marks of " << name;
-  text.replace(first, last - first, table);
-  std::ofstream(kDocument) << text;
-}
-
 // Compares measured values with a row's limits, from its column `from` on. The limits are for the
 // packing that is made without sanitizers.
 void expect_below(const std::vector<std::string>& row, std::size_t from,
@@ -181,7 +171,7 @@ TEST(AccuracyDocument, ModesAreAsStated) {
   measure_synthetic(&measured);
   const auto data = test::data_dir();
   if (data && !test::kSanitized) measure_robot(*data, &measured);
-  if (updating()) write_table("modes", modes_table(measured));
+  if (updating()) ASSERT_TRUE(test::replace_table(kDocument, "modes", modes_table(measured)));
   const test::TableRows rows = test::parse_table(test::read_text(kDocument), "modes");
   std::set<std::string> stated;
   for (const std::vector<std::string>& row : rows) {
@@ -206,7 +196,8 @@ TEST(AccuracyDocument, ModesAreAsStated) {
 TEST(AccuracyDocument, HardCasesAreAsStated) {
   Measured exact, coarse;
   measure_hard_cases(&exact, &coarse);
-  if (updating()) write_table("hard cases", hard_table(exact, coarse));
+  if (updating())
+    ASSERT_TRUE(test::replace_table(kDocument, "hard cases", hard_table(exact, coarse)));
   const test::TableRows rows = test::parse_table(test::read_text(kDocument), "hard cases");
   std::set<std::string> stated;
   for (const std::vector<std::string>& row : rows) {

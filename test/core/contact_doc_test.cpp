@@ -6,9 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <string>
@@ -54,13 +52,7 @@ std::string table(const std::string& header, const Rows& rows) {
 }
 
 void check(const std::string& name, const std::string& header, const Rows& rows) {
-  if (updating()) {
-    std::string text = test::read_text(kDocument);
-    const auto [first, last] = test::table_place(text, name);
-    ASSERT_GT(last, 0U) << kDocument << " lacks the marks of " << name;
-    text.replace(first, last - first, table(header, rows));
-    std::ofstream(kDocument) << text;
-  }
+  if (updating()) ASSERT_TRUE(test::replace_table(kDocument, name, table(header, rows)));
   std::size_t known = 0;
   for (const std::vector<std::string>& row : test::parse_table(test::read_text(kDocument), name)) {
     const std::size_t width = rows.begin()->second.size();
@@ -146,6 +138,16 @@ std::vector<Eigen::Isometry3d> overlapping_poses(const Pair& pair, int count) {
   return poses;
 }
 
+// The mean and the largest error in percent.
+std::vector<double> percents(const std::vector<double>& errors) {
+  double sum = 0.0, largest = 0.0;
+  for (const double error : errors) {
+    sum += std::abs(error);
+    largest = std::max(largest, std::abs(error));
+  }
+  return {100.0 * sum / static_cast<double>(errors.size()), 100.0 * largest};
+}
+
 TEST(ContactDocument, BodyAgainstBody) {
   Rows rows;
   for (const Pair& pair : pairs()) {
@@ -157,17 +159,11 @@ TEST(ContactDocument, BodyAgainstBody) {
     for (const int spheres : {50, 200, 1000}) {
       if (test::kSanitized && spheres > 50) continue;  // packing takes too long
       const ContactLink a(packed_shape(pair.first), spheres), b(packed_shape(pair.second), spheres);
-      double sum = 0.0, largest = 0.0;
+      std::vector<double> errors;
       for (std::size_t i = 0; i < poses.size(); ++i) {
-        const ContactVolume found = contact_volume(*a.body, *b.body, poses[i]);
-        const double error = found.volume / truths[i] - 1.0;
-        sum += std::abs(error);
-        largest = std::max(largest, std::abs(error));
+        errors.push_back(contact_volume(*a.body, *b.body, poses[i]).volume / truths[i] - 1.0);
       }
-      const auto count = static_cast<double>(poses.size());
-      char key[64];
-      std::snprintf(key, sizeof key, "%s | %d", pair.name.c_str(), spheres);
-      rows[key] = {100.0 * sum / count, 100.0 * largest};
+      rows[pair.name + " | " + std::to_string(spheres)] = percents(errors);
     }
   }
   check("bodies", "| bodies | spheres each | mean error [%] | largest error [%] |", rows);
@@ -195,16 +191,13 @@ TEST(ContactDocument, CloudThatFillsABody) {
     for (const int cell : {20, 10}) {
       const double thinning = 1e-3 * cell;
       const CloudSnapshot cloud = test::thinned(samples(pair.second, thinning / 3.0), thinning);
-      double sum = 0.0, largest = 0.0;
+      std::vector<double> errors;
       for (const Eigen::Isometry3d& X_AB : poses) {
         const ContactVolume found =
             contact_volume(link.link(), *link.body, X_AB.inverse(), {&cloud});
-        const double truth = true_overlap(pair.first, pair.second, X_AB);
-        sum += std::abs(found.volume / truth - 1.0);
-        largest = std::max(largest, std::abs(found.volume / truth - 1.0));
+        errors.push_back(found.volume / true_overlap(pair.first, pair.second, X_AB) - 1.0);
       }
-      rows[pair.name + " | " + std::to_string(cell)] = {
-          100.0 * sum / static_cast<double>(poses.size()), 100.0 * largest};
+      rows[pair.name + " | " + std::to_string(cell)] = percents(errors);
     }
   }
   check("clouds", "| bodies | cell [mm] | mean error [%] | largest error [%] |", rows);
@@ -229,9 +222,7 @@ std::vector<double> jumps(const std::function<ContactVolume(double)>& at, double
 }
 
 Eigen::Isometry3d along(double s) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.translation() = s * Eigen::Vector3d(1.0, 0.3, -0.2).normalized();
-  return X;
+  return Eigen::Isometry3d(Eigen::Translation3d(s * Eigen::Vector3d(1.0, 0.3, -0.2).normalized()));
 }
 
 TEST(ContactDocument, ForcesDoNotJump) {

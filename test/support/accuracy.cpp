@@ -7,6 +7,17 @@
 #include <sstream>
 
 namespace ist::test {
+namespace {
+
+// The first and the last place between the marks; 0 without them.
+std::pair<std::size_t, std::size_t> table_place(const std::string& text, const std::string& name) {
+  const std::string begin = "<!-- " + name + " -->\n", end = "<!-- end of " + name + " -->";
+  const std::size_t first = text.find(begin), last = text.find(end);
+  if (first == std::string::npos || last == std::string::npos) return {0, 0};
+  return {first + begin.size(), last};
+}
+
+}  // namespace
 
 void Accuracy::add(const LinkProximity& result, double truth, double max_distance,
                    double rounding) {
@@ -51,13 +62,6 @@ double stated_limit(double value, double tolerance) {
   return value <= tolerance ? std::min(limit, tolerance) : limit;
 }
 
-std::pair<std::size_t, std::size_t> table_place(const std::string& text, const std::string& name) {
-  const std::string begin = "<!-- " + name + " -->\n", end = "<!-- end of " + name + " -->";
-  const std::size_t first = text.find(begin), last = text.find(end);
-  if (first == std::string::npos || last == std::string::npos) return {0, 0};
-  return {first + begin.size(), last};
-}
-
 TableRows parse_table(const std::string& text, const std::string& name) {
   const auto [first, last] = table_place(text, name);
   std::istringstream lines(text.substr(first, last - first));
@@ -74,6 +78,14 @@ TableRows parse_table(const std::string& text, const std::string& name) {
     rows.push_back(std::move(row));
   }
   return rows;
+}
+
+bool replace_table(const std::string& path, const std::string& name, const std::string& table) {
+  std::string text = read_text(path);
+  const auto [first, last] = table_place(text, name);
+  if (last == 0) return false;
+  text.replace(first, last - first, table);
+  return static_cast<bool>(std::ofstream(path) << text);
 }
 
 std::string read_text(const std::string& path) {

@@ -46,9 +46,11 @@ double stated_limit(double value, double tolerance);
 /// without its header.
 using TableRows = std::vector<std::vector<std::string>>;
 
-std::pair<std::size_t, std::size_t> table_place(const std::string& text, const std::string& name);
-
 TableRows parse_table(const std::string& text, const std::string& name);
+
+/// Puts another table between the marks of a document.
+/// @returns false where the document lacks them, or cannot be written
+bool replace_table(const std::string& path, const std::string& name, const std::string& table);
 
 std::string read_text(const std::string& path);
 
