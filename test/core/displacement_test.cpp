@@ -25,16 +25,6 @@ const std::vector<TriangleMesh>& meshes() {
   return kMeshes;
 }
 
-// The box is of the whole geometry and not of the spheres inside it alone.
-TEST(Displacement, BoxHasAllVertices) {
-  for (const double max_error : {0.002, 0.02}) {
-    for (const TriangleMesh& mesh : meshes()) {
-      const Eigen::AlignedBox3d box = bounding_box(test::make_link(mesh, max_error));
-      for (const Eigen::Vector3d& p_L : mesh.vertices) EXPECT_TRUE(box.contains(p_L));
-    }
-  }
-}
-
 TEST(Displacement, NoPointOfALinkMovesFarther) {
   test::Rng rng(32);
   for (const TriangleMesh& mesh : meshes()) {
