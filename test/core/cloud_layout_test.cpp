@@ -39,6 +39,21 @@ class CloudLayoutTest : public ::testing::Test {
     EXPECT_EQ(cloud.data, nullptr) << "a faulty layout must not be usable";
   }
 
+  // Changes of the layout, one by one, and the words that name what is wrong then.
+  struct Fault {
+    void (*change)(CloudLayout*);
+    std::vector<std::string> words;
+  };
+  void expect_faults(const std::vector<Fault>& faults) {
+    const CloudLayout whole = layout_;
+    for (std::size_t i = 0; i < faults.size(); ++i) {
+      SCOPED_TRACE(i);
+      layout_ = whole;
+      faults[i].change(&layout_);
+      expect_fault(faults[i].words);
+    }
+  }
+
   RawCloud expect_valid() {
     RawCloud cloud;
     EXPECT_EQ(check_layout(layout_, &cloud), "");
@@ -48,26 +63,6 @@ class CloudLayoutTest : public ::testing::Test {
   std::vector<std::uint8_t> bytes_;
   CloudLayout layout_;
 };
-
-TEST_F(CloudLayoutTest, readsAValidLayout) {
-  const RawCloud cloud = expect_valid();
-  EXPECT_EQ(cloud.data, bytes_.data());
-  EXPECT_EQ(cloud.width, 8U);
-  EXPECT_EQ(cloud.height, 4U);
-  EXPECT_EQ(cloud.size(), 32U);
-  EXPECT_EQ(cloud.point_step, 16U);
-  EXPECT_EQ(cloud.row_step, 128U);
-  EXPECT_EQ(cloud.x, 0U);
-  EXPECT_EQ(cloud.y, 4U);
-  EXPECT_EQ(cloud.z, 8U);
-  EXPECT_FALSE(cloud.is_double);
-}
-
-TEST_F(CloudLayoutTest, byteOrderIsComparedWithTheMachines) {
-  const bool little = expect_valid().swap_bytes;
-  layout_.is_bigendian = true;
-  EXPECT_NE(little, expect_valid().swap_bytes);
-}
 
 TEST_F(CloudLayoutTest, fieldsMayComeInAnyOrderAndPlace) {
   layout_.fields = {{"intensity", 0, kUint32, 1},
@@ -86,54 +81,43 @@ TEST_F(CloudLayoutTest, fieldsMayComeInAnyOrderAndPlace) {
 
 // What a message says that contradicts itself, and the words that name it.
 TEST_F(CloudLayoutTest, faultsAreNamed) {
-  struct Case {
-    void (*change)(CloudLayout*);
-    std::vector<std::string> words;
-  };
   using L = CloudLayout;
-  const std::vector<Case> cases = {
-      {[](L* l) { l->fields.erase(l->fields.begin()); }, {"'x'", "missing"}},
-      {[](L* l) { l->fields.erase(l->fields.begin() + 1); }, {"'y'", "missing"}},
-      {[](L* l) { l->fields.erase(l->fields.begin() + 2); }, {"'z'", "missing"}},
-      {[](L* l) { l->fields.clear(); }, {"'x'", "missing"}},
-      {[](L* l) { l->fields[1].datatype = kInt16; }, {"'y'", "int16 (3)", "float32"}},
-      {[](L* l) { l->fields[1].datatype = 0; }, {"'y'", "unknown (0)"}},
-      {[](L* l) { l->fields[1].datatype = 200; }, {"'y'", "unknown (200)"}},
-      {[](L* l) { l->fields[2].datatype = kFloat64; },
-       {"'x'", "float32 (7)", "'z'", "float64 (8)"}},
-      {[](L* l) { l->fields[0].count = 3; }, {"'x'", "count 3"}},
-      {[](L* l) { l->fields[2].offset = 13; }, {"'z'", "offset 13", "17", "point_step of 16"}},
-      // Offset and size do not fit 32 bits.
-      {[](L* l) { l->fields[2].offset = kMax - 1; }, {"'z'", std::to_string(kMax - 1)}},
-      {[](L* l) { l->fields[1].offset = 2; }, {"'x'", "'y'", "offset 2", "overlap"}},
-      {[](L* l) { l->fields[1].offset = 0; }, {"overlap"}},
-      {[](L* l) { l->fields[3].name = "y"; }, {"'y'", "2 times"}},
-      {[](L* l) { l->point_step = 0; }, {"point_step", "0"}},
-      {[](L* l) { l->row_step = 127; }, {"row_step", "127", "width 8", "point_step 16", "128"}},
-      {[](L* l) { l->row_step = 127, l->height = 1; }, {"row_step", "127"}},
-      {[](L* l) { l->row_step = 0; }, {"row_step", "0", "128"}},
-      {[](L* l) { l->data_size = 511; }, {"data", "511", "height 4", "row_step 128", "512"}},
-      {[](L* l) { l->data_size = 0, l->data = nullptr; }, {"data", "0 bytes"}},
-      {[](L* l) { l->data = nullptr; }, {"null"}},
-      // 2^32 - 1 rows of 2^32 - 1 bytes: in 32 bits the product is 1, and would pass.
-      {[](L* l) { l->width = kMax; }, {"row_step", std::to_string(16ULL * kMax)}},
-      {[](L* l) { l->width = 1, l->height = l->row_step = kMax; },
-       {"data", std::to_string(std::uint64_t{kMax} * kMax)}},
-      // A width that times 16 is 2^32, which is 0 in 32 bits.
-      {[](L* l) { l->width = 1U << 28, l->height = 1, l->row_step = 0; }, {"data", "4294967296"}},
-      {[](L* l) {
-         l->width = l->height = 1U << 16;
-         l->row_step = 1U << 20;
-         l->data_size = std::numeric_limits<std::size_t>::max();
-       },
-       {"65536", "32 bits"}}};
-  const CloudLayout whole = layout_;
-  for (std::size_t i = 0; i < cases.size(); ++i) {
-    SCOPED_TRACE(i);
-    layout_ = whole;
-    cases[i].change(&layout_);
-    expect_fault(cases[i].words);
-  }
+  expect_faults(
+      {{[](L* l) { l->fields.erase(l->fields.begin()); }, {"'x'", "missing"}},
+       {[](L* l) { l->fields.erase(l->fields.begin() + 1); }, {"'y'", "missing"}},
+       {[](L* l) { l->fields.erase(l->fields.begin() + 2); }, {"'z'", "missing"}},
+       {[](L* l) { l->fields.clear(); }, {"'x'", "missing"}},
+       {[](L* l) { l->fields[1].datatype = kInt16; }, {"'y'", "int16 (3)", "float32"}},
+       {[](L* l) { l->fields[1].datatype = 0; }, {"'y'", "unknown (0)"}},
+       {[](L* l) { l->fields[1].datatype = 200; }, {"'y'", "unknown (200)"}},
+       {[](L* l) { l->fields[2].datatype = kFloat64; },
+        {"'x'", "float32 (7)", "'z'", "float64 (8)"}},
+       {[](L* l) { l->fields[0].count = 3; }, {"'x'", "count 3"}},
+       {[](L* l) { l->fields[2].offset = 13; }, {"'z'", "offset 13", "17", "point_step of 16"}},
+       // Offset and size do not fit 32 bits.
+       {[](L* l) { l->fields[2].offset = kMax - 1; }, {"'z'", std::to_string(kMax - 1)}},
+       {[](L* l) { l->fields[1].offset = 2; }, {"'x'", "'y'", "offset 2", "overlap"}},
+       {[](L* l) { l->fields[1].offset = 0; }, {"overlap"}},
+       {[](L* l) { l->fields[3].name = "y"; }, {"'y'", "2 times"}},
+       {[](L* l) { l->point_step = 0; }, {"point_step", "0"}},
+       {[](L* l) { l->row_step = 127; }, {"row_step", "127", "width 8", "point_step 16", "128"}},
+       {[](L* l) { l->row_step = 127, l->height = 1; }, {"row_step", "127"}},
+       {[](L* l) { l->row_step = 0; }, {"row_step", "0", "128"}},
+       {[](L* l) { l->data_size = 511; }, {"data", "511", "height 4", "row_step 128", "512"}},
+       {[](L* l) { l->data_size = 0, l->data = nullptr; }, {"data", "0 bytes"}},
+       {[](L* l) { l->data = nullptr; }, {"null"}},
+       // 2^32 - 1 rows of 2^32 - 1 bytes: in 32 bits the product is 1, and would pass.
+       {[](L* l) { l->width = kMax; }, {"row_step", std::to_string(16ULL * kMax)}},
+       {[](L* l) { l->width = 1, l->height = l->row_step = kMax; },
+        {"data", std::to_string(std::uint64_t{kMax} * kMax)}},
+       // A width that times 16 is 2^32, which is 0 in 32 bits.
+       {[](L* l) { l->width = 1U << 28, l->height = 1, l->row_step = 0; }, {"data", "4294967296"}},
+       {[](L* l) {
+          l->width = l->height = 1U << 16;
+          l->row_step = 1U << 20;
+          l->data_size = std::numeric_limits<std::size_t>::max();
+        },
+        {"65536", "32 bits"}}});
 }
 
 // Drivers leave out numbers that follow from others, and add fields and bytes of their own.
@@ -181,39 +165,28 @@ TEST_F(CloudLayoutTest, emptyCloudWithItsFieldsIsValid) {
 // A cloud that says to be empty and holds bytes is not one of nothing: an obstacle may be in them.
 // One of colours alone, or of no field at all, has not measured where anything is.
 TEST_F(CloudLayoutTest, whatIsNotEmptyOrHasNoCoordinatesIsFaulty) {
-  const CloudLayout whole = layout_;
-  layout_.width = 0;
-  layout_.row_step = 0;
-  expect_fault({"width 0", "height 4", "no point", "512 bytes"});
-  layout_.height = 0;
-  expect_fault({"width 0", "height 0", "no point", "512 bytes"});
-  layout_ = whole;
-  layout_.height = 0;
-  expect_fault({"width 8", "height 0", "no point", "512 bytes"});
-  layout_.data_size = 1;
-  expect_fault({"1 bytes"});
-  layout_.data_size = 0;  // rows of 128 bytes are announced, and none is there
-  layout_.width = 0;
-  layout_.height = 4;
-  expect_fault({"data holds 0 bytes", "height 4", "row_step 128"});
-
-  layout_.height = layout_.row_step = 0;
+  using L = CloudLayout;
+  expect_faults(
+      {{[](L* l) { l->width = l->row_step = 0; }, {"width 0", "height 4", "no point", "512 bytes"}},
+       {[](L* l) { l->width = l->height = l->row_step = 0; },
+        {"width 0", "height 0", "no point", "512 bytes"}},
+       {[](L* l) { l->height = 0; }, {"width 8", "height 0", "no point", "512 bytes"}},
+       {[](L* l) { l->height = 0, l->data_size = 1; }, {"1 bytes"}},
+       // Rows of 128 bytes are announced, and none is there.
+       {[](L* l) { l->width = 0, l->data_size = 0; },
+        {"data holds 0 bytes", "height 4", "row_step 128"}}});
+  layout_.width = layout_.height = layout_.row_step = 0;
+  layout_.data_size = 0;
   layout_.data = nullptr;
-  const CloudLayout empty = layout_;
-  const auto expect_of_empty = [&](const std::vector<RawField>& fields, std::uint32_t point_step,
-                                   const std::vector<std::string>& words) {
-    layout_ = empty;
-    layout_.fields = fields;
-    layout_.point_step = point_step;
-    expect_fault(words);
-  };
-  const RawField x = whole.fields[0], y = whole.fields[1], z = whole.fields[2];
-  expect_of_empty({}, 16, {"'x'", "missing"});
-  expect_of_empty({{"rgb", 0, kFloat32, 1}}, 16, {"'x'", "missing"});
-  expect_of_empty({x, y}, 16, {"'z'", "missing"});
-  expect_of_empty({{"x", 0, kInt16, 1}, y, z}, 16, {"'x'", "int16"});
-  expect_of_empty({x, {"y", 0, kFloat32, 1}, z}, 16, {"overlap"});
-  expect_of_empty({x, y, z}, 8, {"'z'", "point_step of 8"});
+  expect_faults({{[](L* l) { l->fields.clear(); }, {"'x'", "missing"}},
+                 {[](L* l) {
+                    l->fields = {{"rgb", 0, kFloat32, 1}};
+                  },
+                  {"'x'", "missing"}},
+                 {[](L* l) { l->fields.resize(2); }, {"'z'", "missing"}},
+                 {[](L* l) { l->fields[0].datatype = kInt16; }, {"'x'", "int16"}},
+                 {[](L* l) { l->fields[1].offset = 0; }, {"overlap"}},
+                 {[](L* l) { l->point_step = 8; }, {"'z'", "point_step of 8"}}});
 }
 
 TEST_F(CloudLayoutTest, morePointsThanAllowed) {
