@@ -178,9 +178,7 @@ CloudSnapshot thinned(const std::vector<Eigen::Vector3d>& points, double thinnin
   IngestConfig config = whole_cloud();
   config.thinning = thinning;
   CloudSnapshot snapshot;
-  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  X_FS.translation() = far;
-  Ingest(config).run(raw, X_FS, {}, 0.0, &snapshot);
+  Ingest(config).run(raw, Eigen::Isometry3d(Eigen::Translation3d(far)), {}, 0.0, &snapshot);
   return snapshot;
 }
 
