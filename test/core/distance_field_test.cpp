@@ -45,15 +45,11 @@ std::size_t nodes_of(const DistanceField::Level& level) {
 double distance_of(const LinkGeometry& link, const Eigen::Vector3d& p) {
   double least = std::numeric_limits<double>::infinity();
   for (const GeometryElement& element : link) {
-    const Eigen::Vector3d p_E = element.X_LE.inverse() * p;
     const auto* mesh = std::get_if<TriangleMesh>(&element.shape);
-    const double distance =
-        mesh != nullptr
-            ? test::oracle_distance(*mesh, p_E)
-            : std::visit(
-                  [&](const auto& shape) { return test::oracle_signed_distance(shape, p_E); },
-                  element.shape);
-    least = std::min(least, distance);
+    const Eigen::Vector3d p_E = element.X_LE.inverse() * p;
+    least =
+        std::min(least, mesh != nullptr ? test::oracle_distance(*mesh, p_E)
+                                        : test::oracle_signed_distance(LinkGeometry{element}, p));
   }
   return std::max(least, 0.0);
 }
@@ -152,8 +148,7 @@ TEST(DistanceField, NoNodeInsideIsTakenForOutside) {
 // About a large link cells are larger, so that memory is bounded.
 TEST(DistanceField, MemoryIsBounded) {
   for (const double size : {1e-4, 0.3, 3.0, 300.0, 9000.0}) {
-    const Solid solid({GeometryElement{Box{{size, 0.5 * size, 0.1 * size}},
-                                       Eigen::Isometry3d::Identity(), "box"}});
+    const Solid solid(test::one(Box{{size, 0.5 * size, 0.1 * size}}));
     const DistanceField field(solid), coarse(solid, DistanceField::Detail::kCoarse);
     EXPECT_FALSE(field.empty()) << size;
     EXPECT_LT(field.memory(), 3000000U) << size;
@@ -163,7 +158,7 @@ TEST(DistanceField, MemoryIsBounded) {
 }
 
 TEST(DistanceField, CanBeCancelled) {
-  const Solid solid({GeometryElement{Sphere{0.1}, Eigen::Isometry3d::Identity(), "sphere"}});
+  const Solid solid(test::one(Sphere{0.1}));
   for (const auto detail : kDetails) {
     EXPECT_THROW(DistanceField(solid, detail, [] { return true; }), Cancelled);
   }
@@ -197,8 +192,7 @@ TEST(FieldContact, ALargeLinkHasDeepPoints) {
 
 // Another link in contact is no reason for a wide interval.
 TEST(FieldContact, TheMinimumOfSeveralElementsIsAsExactAsAsked) {
-  Eigen::Isometry3d X_LE = Eigen::Isometry3d::Identity();
-  X_LE.translation().x() = 0.1;
+  const Eigen::Isometry3d X_LE(Eigen::Translation3d(0.1, 0.0, 0.0));
   const LinkGeometry two = {
       GeometryElement{test::open_box({0.1, 0.1, 0.1}), Eigen::Isometry3d::Identity(), "open box"},
       GeometryElement{test::box({0.1, 0.05, 0.05}), X_LE, "box"}};
