@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <vector>
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/allocations.h"
+#include "support/box_oracle.h"
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
@@ -77,8 +77,7 @@ TEST(ContactVolume, IsTheSameFarFromTheOrigin) {
   const Eigen::Vector3d far(433000.0, 5411000.0, 110.0);  // map coordinates
   const CloudSnapshot near_cloud = test::thinned(wall(0.2, 0.003, 0.0));
   const CloudSnapshot far_cloud = test::thinned(wall(0.2, 0.003, 0.0), 0.01, far);
-  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-  X_FL.translation() = Eigen::Vector3d(0.01, 0.02, 0.01);
+  Eigen::Isometry3d X_FL(Eigen::Translation3d(0.01, 0.02, 0.01));
   const ContactVolume here = contact_volume(link.link(), *link.body, X_FL, {&near_cloud});
   X_FL.translation() += far;
   const ContactVolume there = contact_volume(link.link(), *link.body, X_FL, {&far_cloud});
@@ -165,8 +164,7 @@ TEST(ContactVolume, PushesOutOfAWall) {
   const ContactLink link(one(Box{{0.2, 0.15, 0.1}}));
   const CloudSnapshot cloud = test::thinned(wall(0.2, 0.003, 0.0));
   for (const double depth : {0.005, 0.01, 0.02, 0.03}) {
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-    X_FL.translation().z() = 0.05 - depth;
+    const Eigen::Isometry3d X_FL(Eigen::Translation3d(0.0, 0.0, 0.05 - depth));
     const ContactVolume found = contact_volume(link.link(), *link.body, X_FL, {&cloud});
     EXPECT_GT(found.weighted_normal.normalized().z(), 0.99) << depth;
     EXPECT_LE(found.weighted_normal.norm(), found.volume);
@@ -194,12 +192,9 @@ TEST(ContactVolume, OfAMapIsThatOfItsBoxes) {
   const ContactLink link(one(Box{{0.2, 0.2, 0.2}}), 500);
   test::Rng rng(104);
   for (const double edge : {0.05, 0.1}) {
-    auto boxes = std::make_shared<BoxIndex>();
     const Eigen::Vector3d low(-0.03, -0.04, -0.02);
-    boxes->build({{low, low + Eigen::Vector3d::Constant(edge)}});
-    CloudSnapshot map;
-    map.boxes = boxes;
-    map.X_FM = test::random_pose(&rng, 1.0);
+    const CloudSnapshot map = test::make_map({{low, low + Eigen::Vector3d::Constant(edge)}},
+                                             test::random_pose(&rng, 1.0));
     Eigen::Isometry3d X_FL = map.X_FM;
     const double full = std::pow(edge, 3);
     const ContactVolume inside = contact_volume(link.link(), *link.body, X_FL, {&map});

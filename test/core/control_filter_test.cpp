@@ -121,24 +121,21 @@ struct Inequalities {
   }
 
   // [m/s] What the velocity exceeds a bound by.
-  double excess(const std::vector<double>& velocity) const {
-    const Eigen::Map<const Eigen::VectorXd> x(velocity.data(), scale.size());
+  double excess(const std::vector<double>& velocity) const { return excess_of(scaled(velocity)); }
+  double excess_of(const Eigen::VectorXd& y) const {
     double excess = 0.0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      excess = std::max(excess, a[i].dot(scale.cwiseProduct(x)) - b[i]);
-    }
+    for (std::size_t i = 0; i < a.size(); ++i) excess = std::max(excess, a[i].dot(y) - b[i]);
     return excess;
+  }
+  Eigen::VectorXd scaled(const std::vector<double>& velocity) const {
+    return scale.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(velocity.data(), scale.size()));
   }
 
   // [m/s] What every velocity exceeds some bound by, for one joint or two: one of the velocities
   // that meet exactly as many bounds as there are joints meets all, where any does.
   double least_excess() const {
     double least = kInf;
-    const auto consider = [&](const Eigen::VectorXd& y) {
-      double excess = 0.0;
-      for (std::size_t k = 0; k < a.size(); ++k) excess = std::max(excess, a[k].dot(y) - b[k]);
-      least = std::min(least, excess);
-    };
+    const auto consider = [&](const Eigen::VectorXd& y) { least = std::min(least, excess_of(y)); };
     for (std::size_t i = 0; i < a.size(); ++i) {
       if (scale.size() == 1) consider(b[i] * a[i]);
       for (std::size_t j = 0; scale.size() == 2 && j < i; ++j) {
@@ -155,8 +152,7 @@ struct Inequalities {
   // to the target is from every sum, with factors >= 0, of normals of bounds that the velocity just
   // meets. As many normals as there are joints suffice (Caratheodory), so all such sets are tried.
   double kkt_residual(const std::vector<double>& velocity) const {
-    const Eigen::Map<const Eigen::VectorXd> x(velocity.data(), scale.size());
-    const Eigen::VectorXd y = scale.cwiseProduct(x);
+    const Eigen::VectorXd y = scaled(velocity);
     std::vector<Eigen::VectorXd> active;
     for (std::size_t i = 0; i < a.size(); ++i) {
       if (a[i].dot(y) < b[i] - 1e-7) continue;
@@ -250,18 +246,16 @@ TEST(VelocityFilter, StandsWhereAnInputCannotBeUsed) {
   expect_standing(filter.run(command, {}, good), FilterReason::kPositions);
   expect_standing(filter.run(command, zero, empty_rows(1, 3)), FilterReason::kRows);
   expect_standing(filter.run(command, zero, ConstraintRows()), FilterReason::kRows);
-  ConstraintRows bad = good;
-  bad.h[0] = std::nan("");
-  expect_standing(filter.run(command, zero, bad), FilterReason::kRows);
-  bad = good;
-  bad.sweep(0, 1) = -1.0;
-  expect_standing(filter.run(command, zero, bad), FilterReason::kRows);
-  bad = good;
-  bad.horizon = 0.0;
-  expect_standing(filter.run(command, zero, bad), FilterReason::kRows);
-  bad = good;
-  bad.count = 2;
-  expect_standing(filter.run(command, zero, bad), FilterReason::kRows);
+  void (*const faults[])(ConstraintRows*) = {
+      [](ConstraintRows* rows) { rows->h[0] = std::nan(""); },
+      [](ConstraintRows* rows) { rows->sweep(0, 1) = -1.0; },
+      [](ConstraintRows* rows) { rows->horizon = 0.0; },
+      [](ConstraintRows* rows) { rows->count = 2; }};
+  for (const auto& make_fault : faults) {
+    ConstraintRows bad = good;
+    make_fault(&bad);
+    expect_standing(filter.run(command, zero, bad), FilterReason::kRows);
+  }
 }
 
 // A joint without a speed limit that is to be endlessly fast excuses none of the other ones.
@@ -409,7 +403,6 @@ TEST(VelocityFilter, ScaleLetsTheRobotLeave) {
   EXPECT_EQ(slower.status, FilterStatus::kScaled);
   EXPECT_EQ(slower.reason, FilterReason::kContradiction);
   EXPECT_NEAR(slower.velocity[0], -0.1, 1e-12);
-  rows.sweep(0, 0) = 1.0;
   rows.sweep_limit[0] = 0.0;  // the link is UNKNOWN
   EXPECT_EQ(filter.run({-0.5}, {0.0}, rows).scale, 0.0);
   EXPECT_EQ(filter.run({std::nan("")}, {0.0}, rows).scale, 0.0);

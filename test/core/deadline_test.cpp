@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "support/box_oracle.h"
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
@@ -71,21 +71,13 @@ CloudSnapshot cube(double half, double spacing) {
   return test::thinned(points, spacing);
 }
 
-// A map with one leaf.
-CloudSnapshot map_of(const Eigen::AlignedBox3d& leaf) {
-  CloudSnapshot map;
-  auto boxes = std::make_shared<BoxIndex>();
-  boxes->build({leaf});
-  map.boxes = boxes;
-  return map;
-}
-
 // A volume that time ends is a lower bound, says how much it is of, and makes no wrench: of a
 // cloud, of one leaf of a map that is divided into thousands of cells, and of two links.
 TEST(Deadline, EndsAContactVolume) {
   const ContactLink link(one(Box{{0.4, 0.4, 0.4}})), mesh(one(test::icosphere(0.2, 5)));
   const CloudSnapshot cloud = cube(0.19, 0.01);
-  const CloudSnapshot map = map_of({Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1)});
+  const CloudSnapshot map =
+      test::make_map({{Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1)}});
   const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
   const Eigen::Isometry3d X(Eigen::Translation3d(0.2, 0.1, 0.05));
   const std::function<ContactVolume(TimePoint)> volumes[] = {

@@ -73,6 +73,17 @@ TEST(HardPoses, RefusesReflectedScaledAndShearedPoses) {
   }
 }
 
+using Poses = std::vector<Eigen::Isometry3d>;
+
+// Moves every link by `size` [m] along each axis at most, and turns it by `size` [rad].
+void move_links(test::Rng* rng, double size, Poses* X_FL) {
+  for (Eigen::Isometry3d& X : *X_FL) {
+    X.translation() += test::random_vector(rng, size);
+    X.rotate(Eigen::AngleAxisd(size, test::random_vector(rng, 1.0).normalized()));
+    X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
+  }
+}
+
 // The last answer is the next query's warm start. Errors must not add up over many small steps.
 TEST(HardMotion, WarmStartDoesNotDrift) {
   test::Rng rng(73);
@@ -87,12 +98,7 @@ TEST(HardMotion, WarmStartDoesNotDrift) {
   std::vector<LinkProximity> results, coarse_results, cold_results;
   const int steps = test::scaled(100000), interval = test::scaled(1000);
   for (int step = 1; step <= steps; ++step) {
-    const double size = std::pow(10.0, test::uniform(&rng, -9, -3));
-    for (Eigen::Isometry3d& X : X_FL) {
-      X.translation() += test::random_vector(&rng, size);
-      X.rotate(Eigen::AngleAxisd(size, test::random_vector(&rng, 1.0).normalized()));
-      X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
-    }
+    move_links(&rng, std::pow(10.0, test::uniform(&rng, -9, -3)), &X_FL);
     ASSERT_TRUE(warm.run(X_FL, known, {&cloud}, &results));
     if (step % 16 == 0) warm_coarse.run(X_FL, known, {&cloud}, &coarse_results);
     if (step % interval != 0) continue;
@@ -108,8 +114,6 @@ TEST(HardMotion, WarmStartDoesNotDrift) {
     }
   }
 }
-
-using Poses = std::vector<Eigen::Isometry3d>;
 
 CloudSnapshot half_flat_cloud(test::Rng* rng, int count) {
   std::vector<Eigen::Vector3d> points;
@@ -137,15 +141,6 @@ std::vector<CloudSnapshot> random_sources(test::Rng* rng, int count) {
     sources.push_back(i % 2 == 0 ? half_flat_cloud(rng, 1500) : random_map(rng, 200));
   }
   return sources;
-}
-
-// Moves every link by `size` [m] along each axis at most, and turns it by `size` [rad].
-void move_links(test::Rng* rng, double size, Poses* X_FL) {
-  for (Eigen::Isometry3d& X : *X_FL) {
-    X.translation() += test::random_vector(rng, size);
-    X.rotate(Eigen::AngleAxisd(size, test::random_vector(rng, 1.0).normalized()));
-    X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
-  }
 }
 
 // Expects an answer at `tolerance` that agrees with the one at tolerance 0.

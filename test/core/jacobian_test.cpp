@@ -12,8 +12,6 @@
 namespace ist {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 std::vector<Eigen::Isometry3d> place(const Kinematics& k, const std::vector<double>& q,
                                      const Eigen::Isometry3d& X_FR) {
   JointPoses joints;

@@ -9,6 +9,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/self_repulsion.h"
+#include "support/box_oracle.h"
 #include "support/contact_oracle.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
@@ -49,10 +50,7 @@ class KeptRepulsionTest : public ::testing::Test {
   }
 
   static Eigen::Isometry3d at(double x) {
-    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-    X.translation().x() = x;
-    X.rotate(Eigen::AngleAxisd(2.0 * x, Eigen::Vector3d::UnitZ()));
-    return X;
+    return Eigen::Translation3d(x, 0, 0) * Eigen::AngleAxisd(2.0 * x, Eigen::Vector3d::UnitZ());
   }
 
   std::shared_ptr<RobotModel> model_;
@@ -98,8 +96,7 @@ TEST_F(KeptRepulsionTest, IsNeverFarFromTheBlendBesideNearPoints) {
     cloud_ = test::thinned(points, 0.001);
     const Eigen::Vector3d step = 1e-3 * test::random_vector(&rng, 1.0).normalized();
     for (int i = 0; i < 12; ++i) {
-      Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-      X_FL.translation() = Eigen::Vector3d(-1e-4 * i, step.y() * i, step.z() * i);
+      const Eigen::Isometry3d X_FL(Eigen::Translation3d(-1e-4 * i, step.y() * i, step.z() * i));
       const RepulsiveWrench found = kept(X_FL), truth = exact(X_FL);
       const double length = config_.gain * repulsion_strength(answer(X_FL), config_);
       if (!(length > 0.0)) continue;
@@ -140,11 +137,8 @@ TEST_F(KeptRepulsionTest, IsBlendedAnewWhereItMatters) {
 
 // A map of a robot that drives stays the same map, at another place.
 TEST_F(KeptRepulsionTest, IsBlendedAnewWhereAMapMoves) {
-  cloud_ = CloudSnapshot();
-  auto boxes = std::make_shared<BoxIndex>();
-  boxes->build({{Eigen::Vector3d(0.1, 0.1, -0.1), Eigen::Vector3d(0.2, 0.3, 0.1)},
-                {Eigen::Vector3d(-0.1, -0.3, 0.0), Eigen::Vector3d(0.0, -0.2, 0.2)}});
-  cloud_.boxes = boxes;
+  cloud_ = test::make_map({{Eigen::Vector3d(0.1, 0.1, -0.1), Eigen::Vector3d(0.2, 0.3, 0.1)},
+                           {Eigen::Vector3d(-0.1, -0.3, 0.0), Eigen::Vector3d(0.0, -0.2, 0.2)}});
   kept(at(0.0));
   cloud_.X_FM.translation().x() += 1e-4;
   EXPECT_EQ(kept(at(0.0)).force, exact(at(0.0)).force);
@@ -153,8 +147,7 @@ TEST_F(KeptRepulsionTest, IsBlendedAnewWhereAMapMoves) {
 // A turn about the link's middle moves its ends.
 TEST_F(KeptRepulsionTest, TurnsCountAsMotion) {
   kept(Eigen::Isometry3d::Identity());
-  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-  X_FL.rotate(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()));
+  const Eigen::Isometry3d X_FL(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()));
   EXPECT_EQ(kept(X_FL).force, exact(X_FL).force);
 }
 

@@ -6,7 +6,9 @@
 
 #include "support/demo_arm.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
 #include "support/random_numbers.h"
+#include "support/random_robots.h"
 
 namespace ist::test {
 
@@ -79,21 +81,15 @@ ControlRobot mesh_control_robot() {
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     LinkDescription link;
     link.name = "l" + std::to_string(i);
-    GeometryElement element;
-    element.shape = shapes[i];
-    link.geometry.push_back(element);
+    link.geometry = one(shapes[i]);
     description.links.push_back(link);
     if (i == 0) continue;
-    JointDescription joint;
-    joint.name = "j" + std::to_string(i);
-    joint.type = JointType::kRevolute;
-    joint.parent_link = "l" + std::to_string(i - 1);
-    joint.child_link = link.name;
-    joint.X_PJ.translation() = Eigen::Vector3d(0.02, 0.05, 0.18);
-    joint.axis = i % 2 == 0 ? Eigen::Vector3d(0.0, 1.0, 0.2) : Eigen::Vector3d(0.1, 0.0, 1.0);
-    joint.lower = -2.5;
-    joint.upper = 2.5;
-    description.joints.push_back(joint);
+    description.joints.push_back(
+        joint("j" + std::to_string(i), JointType::kRevolute, "l" + std::to_string(i - 1), link.name,
+              {0.02, 0.05, 0.18},
+              i % 2 == 0 ? Eigen::Vector3d(0.0, 1.0, 0.2) : Eigen::Vector3d(0.1, 0.0, 1.0)));
+    description.joints.back().lower = -2.5;
+    description.joints.back().upper = 2.5;
   }
   RobotModelConfig config;
   config.packing.max_error = 0.01;
