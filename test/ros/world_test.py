@@ -166,7 +166,7 @@ class WorldTest(unittest.TestCase):
             one = pt.link(message, "ball_link")
             if t < begin:
                 if t > begin - 0.2:  # its way to where it begins is forgotten
-                    self.assertEqual(message.status, ProximityArray.OK, message.status_text)
+                    self.assertNotIn("'carriage'", message.status_text)
                 continue
             if not begin + late + 0.5 < t < begin + 1.35:
                 continue
