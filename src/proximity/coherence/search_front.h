@@ -92,16 +92,12 @@ class SearchFront {
   /// Removes the parts that are to be looked at again: those whose bound is below a limit and, near
   /// holes, those that may be inside.
   /// @param limit      [m] at the pose of this search
-  /// @param is_closed  whether the link's surface is: where a point has come to be inside, a
-  /// surface
-  ///                   has come nearer
-  /// @param reopen     is called with each of them, its bounds being those at the pose of this
-  /// search
-  /// @returns the bounds of the parts that stay, at the pose of this search
+  /// @param is_closed  whether the link's surface is: a point comes to be inside through it only
+  /// @param reopen     is called with each of them, its bounds being those at that pose
+  /// @returns the bounds of the parts that stay, at that pose
   template <class Reopen>
   LeastBounds remove_below(float limit, bool is_closed, const Reopen& reopen) {
-    // Nearly all parts stay. They are compared as stored, and their least bound is moved at the
-    // end.
+    // Nearly all parts stay: they are compared as stored, and only their least bound is moved.
     LeastBounds least;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < size_; ++i) {
