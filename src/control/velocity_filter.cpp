@@ -199,8 +199,8 @@ struct VelocityFilter::Impl {
     }
   }
 
-  // Where nothing is told to hold the velocity back, tells the joints whose limits the solver has
-  // neglected beside a joint that is many times as fast.
+  // The solver neglects the limits of a joint beside one that is many times as fast: such joints
+  // are told where nothing else is.
   void tell_held() {
     if (!answer.rows.empty() || !answer.joints.empty()) return;
     for (Eigen::Index k = 0; k < joints; ++k) {
