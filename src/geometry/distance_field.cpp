@@ -47,7 +47,6 @@ class DistanceField::Builder {
   void run() {
     if (solid_.empty() || !find_bounds()) return;
     field_.is_closed_ = solid_.is_closed();
-    has_margins_ = is_one_mesh(solid_) && !field_.is_closed_;
     for (std::size_t i = 0; i < kGrids.size(); ++i) {
       Eigen::AlignedBox3d box = bounds_;
       box.min().array() -= kGrids[i].margin;
@@ -217,11 +216,9 @@ class DistanceField::Builder {
     const double from_bounds = bounds_.exteriorDistance(p_L);
     if (from_bounds >= distance_) return distance_;
     if (!(distance_ > 0.0)) return from_bounds;
-    if (has_margins_) {
-      return std::max(from_bounds,
-                      std::min(outside_margin(solid_, p_L, distance_).margin, distance_));
+    if (!field_.is_closed_) {
+      return std::max(from_bounds, outside_margin(solid_, p_L, distance_).margin);
     }
-    if (!field_.is_closed_) return from_bounds;
     if (!(side_radius_ > 0.0)) {
       side_ = solid_.is_inside(p_L) ? Side::kInside : Side::kOutside;
     }
@@ -236,8 +233,7 @@ class DistanceField::Builder {
   DistanceField& field_;
   const double scale_, node_share_;  // of edges and of nodes, by the detail
   Eigen::AlignedBox3d bounds_;       // [m] of the solid
-  bool has_margins_ = false;
-  double cell_ = 0.0;  // [m] of the level at work
+  double cell_ = 0.0;                // [m] of the level at work
   // The next seven are about the node that was measured last.
   double distance_ = 0.0, upper_ = 0.0;  // [m] bounds of its distance
   Eigen::Vector3d hint_L_ = Eigen::Vector3d::Zero(), surface_L_ = Eigen::Vector3d::Zero();

@@ -13,7 +13,10 @@ using Edge = OpenEdgeHierarchy::Edge;
 constexpr double kFourPi = 12.566370614359172;
 // Float loses less than this share of a length that it holds.
 constexpr double kEdgeRounding = 5e-7;
-constexpr int kBisections = 6;
+// A steady radius is looked for down to a share of 2^-kHalvings of the largest, and to this share
+// of itself.
+constexpr int kHalvings = 12;
+constexpr double kResolution = 0.05;
 constexpr float kFarAway = 1e6F;  // [m]
 
 std::vector<Edge> edges_of(const TriangleMesh& mesh, const std::vector<OpenEdge>& open) {
@@ -204,9 +207,10 @@ double OpenEdgeHierarchy::steady_radius(const Eigen::Vector3d& p_M, double chang
            (1.0 - 1e-9) * change;
   };
   if (is_steady(max_radius)) return max_radius;
-  double steady = 0.0, step = std::min(max_radius, nearest);
-  for (int i = 0; i < kBisections; ++i) {
-    step *= 0.5;
+  double steady = std::min(max_radius, nearest);
+  for (int i = 0; i < kHalvings && !is_steady(steady); ++i) steady *= 0.5;
+  if (!is_steady(steady)) return 0.0;
+  for (double step = 0.5 * steady; step > kResolution * steady; step *= 0.5) {
     if (is_steady(steady + step)) steady += step;
   }
   return steady;

@@ -9,23 +9,25 @@
 namespace ist {
 namespace {
 
-// [m] Larger margins are not looked for: the gradient's bound grows with them.
-constexpr double kLargestMargin = 0.05;
 // Places are outside below this winding number, and inside above 1 less it, in spite of the errors
 // of winding numbers, which are 0.01 about, and larger for the quick one.
 constexpr double kSurelyOutside = 0.47;
 
-SideMargin measure(const Solid& solid, const Eigen::Vector3d& p_L, double largest,
+// Of one element; p_E [m] is in its frame. That no way crosses the surface holds a closed element's
+// places on one side.
+SideMargin measure(const SolidElement& element, const Eigen::Vector3d& p_E, double largest,
                    bool also_inside) {
-  const SolidElement& element = elements_of(solid).front();
-  const Eigen::Vector3d p_E = element.X_EL * p_L;
+  if (element.is_closed) {
+    const bool is_inside = element.is_inside(p_E);
+    return {is_inside, is_inside && !also_inside ? 0.0 : largest};
+  }
   const Eigen::AlignedBox3d& box = element.bvh.bounds();
   double error;
   const double quick = element.bvh.quick_winding_number(p_E, &error);
   SideMargin result;
   result.is_inside =
       std::abs(quick - 0.5) > error ? box.contains(p_E) && quick > 0.5 : element.is_inside(p_E);
-  double slack = kSurelyOutside - (quick + error), radius = std::min(largest, kLargestMargin);
+  double slack = kSurelyOutside - (quick + error), radius = largest;
   if (result.is_inside) {
     // The inside ends at the box about the mesh, too.
     const double to_box = std::min((p_E - box.min()).minCoeff(), (box.max() - p_E).minCoeff());
@@ -35,6 +37,20 @@ SideMargin measure(const Solid& solid, const Eigen::Vector3d& p_L, double larges
   if (!(slack > 0.0) || !(radius > 0.0)) return result;
   result.margin = element.open_edges.steady_radius(p_E, slack, (1.0 - 1e-9) * radius);
   return result;
+}
+
+// A place is inside where it is inside one element.
+SideMargin measure(const Solid& solid, const Eigen::Vector3d& p_L, double largest,
+                   bool also_inside) {
+  SideMargin outside{false, largest};
+  for (const SolidElement& element : elements_of(solid)) {
+    const Eigen::Vector3d p_E = element.X_EL * p_L;
+    if (element.is_mesh() && element.bvh.bounds().exteriorDistance(p_E) > largest) continue;
+    const SideMargin found = measure(element, p_E, largest, also_inside);
+    if (found.is_inside) return found;
+    outside.margin = std::min(outside.margin, found.margin);
+  }
+  return outside;
 }
 
 }  // namespace

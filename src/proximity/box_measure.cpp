@@ -5,6 +5,8 @@
 #include <limits>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/geometry/numbers.h"
+#include "internal/geometry/outside_margin.h"
 #include "proximity/obstacle_measure.h"
 #include "proximity/overlap_descent.h"
 
@@ -24,6 +26,8 @@ Eigen::AlignedBox3d box_of(const SearchEntry& entry) {
           Eigen::Vector3d(entry.max[0], entry.max[1], entry.max[2])};
 }
 
+double radius_of(const Eigen::AlignedBox3d& box) { return 0.5 * box.sizes().norm(); }
+
 }  // namespace
 
 // [m] What is farther does not matter, nor will it at the next poses.
@@ -39,12 +43,15 @@ BoxDistance BoxMeasure::measure_distance(const Eigen::AlignedBox3d& box, double 
   return distance_to_box(link_.context.solid(), box, obstacles_.X_OL, limit, near_O);
 }
 
-// Whether a place is outside, by its cover distance or by the winding number.
-bool BoxMeasure::is_outside(const Eigen::Vector3d& p_OC) const {
+// Whether all of a box, which the surface does not meet, is outside: by its cover distance, or by
+// how far from its centre all places are outside.
+bool BoxMeasure::is_outside(const Eigen::AlignedBox3d& box) const {
   const InnerSphereTree& tree = link_.context.tree();
-  const Eigen::Vector3d p_LC = obstacles_.X_LO * p_OC;
-  return tree.cover_distance_exceeds(p_LC, tree.interior_gap()) ||
-         !link_.context.solid().is_inside(p_LC);
+  const Eigen::Vector3d p_LC = obstacles_.X_LO * box.center();
+  const double radius = radius_of(box);
+  if (tree.cover_distance_exceeds(p_LC, tree.interior_gap() + radius)) return true;
+  const SideMargin side = outside_margin(link_.context.solid(), p_LC, 1.001 * radius);
+  return !side.is_inside && side.margin > radius;
 }
 
 float BoxMeasure::measure_outside(const SearchEntry& entry, float /*rounding*/) {
@@ -58,30 +65,38 @@ float BoxMeasure::measure_outside(const SearchEntry& entry, float /*rounding*/) 
   return round_down(std::min(found.lower_bound, found.distance));
 }
 
-// A box that the surface does not meet is inside or outside as a whole, where its centre is.
-BoxMeasure::Found BoxMeasure::measure_box(const SearchEntry& entry) {
-  const Eigen::AlignedBox3d box = box_of(entry);
-  const ObstacleId id = id_of(entry);
+BoxMeasure::Found BoxMeasure::measure_box(SearchEntry* entry) {
+  const Eigen::AlignedBox3d box = box_of(*entry);
+  const ObstacleId id = id_of(*entry);
   const BoxDistance found = measure_distance(box, useful_distance());
-  if (found.distance > 0.0 && is_outside(box.center())) {
+  entry->distance = round_down(std::min(found.lower_bound, found.distance));
+  if (found.distance > 0.0 && is_outside(box)) {
     take_outside(found, id);
-    return {true, round_down(std::min(found.lower_bound, found.distance))};
+    return {true, entry->distance};
   }
-  const float bound = measure_part(box, id);
+  const float bound = measure_part(*entry);
   if (found.distance == 0.0 && static_cast<double>(bound) < link_.search.prune_bound()) {
     take_overlap(box, found, id);
+  } else if (found.distance > 0.0 && found.distance < kInfinity &&
+             !link_.context.solid().is_closed()) {
+    take_point(found.p_OB, id);
   }
   return {false, bound};
 }
 
 // @returns [m] no point of the part has a smaller signed distance
-float BoxMeasure::measure_part(const Eigen::AlignedBox3d& part, ObstacleId id) {
+float BoxMeasure::measure_part(const SearchEntry& entry) {
+  const Eigen::AlignedBox3d part = box_of(entry);
+  const Solid& solid = link_.context.solid();
   const Eigen::Vector3d p_OQ = part.center(), p_LQ = obstacles_.X_LO * p_OQ;
   ++link_.search.statistics->exact_evaluations;
-  const SignedDistance measured = link_.context.solid().signed_distance(p_LQ);
-  link_.search.offer(measured, p_OQ, obstacles_, id);
-  return round_down(distance_floor(link_.context.solid(), p_LQ, measured) -
-                    0.5 * part.sizes().norm());
+  const SignedDistance measured = solid.signed_distance(p_LQ);
+  link_.search.offer(measured, p_OQ, obstacles_, id_of(entry));
+  // Through the opening of a mesh with holes, a part of a box that meets no surface may be inside.
+  if (measured.distance > 0.0 && entry.distance > 0.0F && is_outside(part)) {
+    return std::max(round_down(measured.distance - radius_of(part)), entry.distance);
+  }
+  return round_down(distance_floor(solid, p_LQ, measured) - radius_of(part));
 }
 
 bool BoxMeasure::may_divide(float bound) const {
@@ -102,7 +117,7 @@ std::array<float, 2> BoxMeasure::divide(std::array<SearchEntry, 2>* halves) {
   for (std::size_t i = 0; i < 2; ++i) {
     SearchEntry& half = (*halves)[i];
     half.is_part = true;
-    bounds[i] = measure_part(box_of(half), id_of(half));
+    bounds[i] = measure_part(half);
     --link_.search.box_cells_left;
   }
   return bounds;

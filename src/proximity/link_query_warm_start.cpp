@@ -90,8 +90,8 @@ void LinkQuery::measure_again(const BoxObstacles& obstacles) {
   const auto& last = link_.kept.last;
   const Eigen::AlignedBox3d box = box_O(*obstacles.bvh, last.id);
   BoxMeasure measure(obstacles, &link_);
-  if (last.was_inside && link_.context.solid().is_closed()) {
-    // The deepest point of a box hardly changes. With holes, the centre of a box may decide.
+  if (last.was_inside) {
+    // The deepest point of a box hardly changes.
     measure.take_point(clamp_to(box, obstacles.X_FO.inverse() * last.p_FCo), last.id);
     if (distance() < 0.0) return;
   }

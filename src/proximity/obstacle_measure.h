@@ -99,7 +99,8 @@ class BoxMeasure : public ObstacleMeasure<BoxBvh> {
     float bound;      ///< [m] no point of the box has a smaller signed distance
   };
   /// Measures a box that may be inside.
-  Found measure_box(const SearchEntry& entry);
+  /// @param entry  its `distance` becomes a lower bound of the distance to the surface
+  Found measure_box(SearchEntry* entry);
   /// Whether a part with this bound may hold a place so much deeper that it matters, and may still
   /// be divided.
   bool may_divide(float bound) const;
@@ -119,8 +120,8 @@ class BoxMeasure : public ObstacleMeasure<BoxBvh> {
   double useful_distance() const;
   BoxDistance measure_distance(const Eigen::AlignedBox3d& box, double limit,
                                const std::optional<Eigen::Vector3d>& near_O = std::nullopt) const;
-  bool is_outside(const Eigen::Vector3d& p_OC) const;
-  float measure_part(const Eigen::AlignedBox3d& part, ObstacleId id);
+  bool is_outside(const Eigen::AlignedBox3d& box) const;
+  float measure_part(const SearchEntry& entry);
   void take_outside(const BoxDistance& found, ObstacleId id);
   void take_overlap(const Eigen::AlignedBox3d& box, const BoxDistance& found, ObstacleId id);
   void descend(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& p_OQ, ObstacleId id);

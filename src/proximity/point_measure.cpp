@@ -45,10 +45,7 @@ SideBalls::Found PointMeasure::side(const Eigen::Vector3d& p_LQ, double least_di
   ++link_.search.statistics->exact_evaluations;
   const Solid& solid = link_.context.solid();
   const double distance = std::max(least_distance, 0.0);
-  const SideMargin measured =
-      solid.is_closed() || !is_one_mesh(solid)
-          ? SideMargin{solid.is_inside(p_LQ), solid.is_closed() ? distance : 0.0}
-          : side_margin(solid, p_LQ, distance);
+  const SideMargin measured = side_margin(solid, p_LQ, distance);
   found = {measured.is_inside ? Side::kInside : Side::kOutside, measured.margin};
   balls.store(p_LQ, found);
   return found;

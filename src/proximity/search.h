@@ -380,10 +380,10 @@ class Search {
 
   // Measures a box that may be inside. What is inside is divided: the part that may be deepest
   // comes first.
-  void measure_box(const Entry& box, float bound) {
+  void measure_box(Entry box, float bound) {
     if (!box.is_part) {
       ++measured_;
-      const auto found = measure_.measure_box(box);
+      const auto found = measure_.measure_box(&box);
       take_limit();
       bound = std::max(bound, found.bound);
       if (found.is_outside) {

@@ -231,8 +231,7 @@ TEST(BoxesInside, AgainstOracleOnTheWay) {
   EXPECT_GT(contact, test::scaled(500));
 }
 
-// Of a link with holes, the centre of a box decides that touches no triangle, whatever was inside
-// at the last pose.
+// Through the opening of a link with holes, boxes are inside in part that touch no triangle.
 TEST(BoxesInside, LinkWithHolesAgreesWithAFreshQuery) {
   test::Rng rng(52);
   const auto model = test::make_model({Shape(test::open_box({0.1, 0.1, 0.1}))}, kMaxError);

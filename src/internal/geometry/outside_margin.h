@@ -6,11 +6,11 @@
 
 namespace ist {
 
-/// Whether a point is inside a solid that is one mesh with holes, and how far around the point all
-/// places are on its side.
+/// Whether a point is inside a solid, and how far around the point all places are on its side.
 ///
-/// Off the surface the winding number w is smooth, and its gradient is an integral along the open
-/// edges alone (the law of Biot and Savart, for the solid angle of a surface):
+/// Off the surface of a mesh with holes the winding number w is smooth, and its gradient is an
+/// integral along the open edges alone (the law of Biot and Savart, for the solid angle of a
+/// surface):
 ///   |grad w| <= sum over open edges of length / (4 pi distance^2).
 /// So while the surface is farther, w stays below 1/2 for some way from a point outside, and longer
 /// the farther the holes are. Thread safe; allocates nothing.
