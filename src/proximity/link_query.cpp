@@ -263,8 +263,9 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   const double distance = closest.exact.distance;
   // Written so that nothing is in range of a pose that is not finite.
   if (!is_in_range()) {
-    // UNKNOWN where nothing was measured and not all is known.
-    if (!search.is_complete || !is_inside_regions()) return;
+    // UNKNOWN where nothing was measured and not all is known: a box whose side is not decided, in
+    // the opening of a mesh with holes, may be inside, though its surface is out of range.
+    if (!search.is_complete || !is_inside_regions() || may_be_inside()) return;
     result->state = LinkState::kClear;
     result->distance = kInfinity;
     result->lower_bound = search.config.max_distance;

@@ -64,6 +64,11 @@ class LinkQuery {
   double proven_points_bound() const { return proven(link_.search.lower_bound()); }
   /// After run(): whether an obstacle was found in range, or its sphere.
   bool is_in_range() const { return distance() <= link_.search.range() && !is_clear_of_extents(); }
+  /// After run(): whether an obstacle may be inside, though none in range was found. What is not
+  /// inside has a bound that is not below the range, but for rounding.
+  bool may_be_inside() const {
+    return !is_in_range() && link_.search.lower_bound() < -link_.search.rounding;
+  }
   /// After run(): whether the clouds' regions of interest hold all that this link has to know.
   bool is_inside_regions() const {
     return link_.search.region_bound >= link_.search.config.max_distance +

@@ -137,7 +137,8 @@ bool LinkQuery::bound_extents(SnapshotSpan clouds, Deadline* deadline) {
   bound = std::max(by_points(), search.first_extent_bound);
   const auto is_enough = [&] { return bound >= spheres.prune_bound() - search.rounding; };
   // Where a point may be inside the link, nothing else is known of the spheres.
-  const bool is_decided = search.is_complete && search.other_links > 0.0;
+  const bool is_decided =
+      search.is_complete && search.other_links > 0.0 && search.outside_bound > -kInfinity;
   const bool is_outside = points > 0.0 || (is_decided && search.closest.exact.distance > 0.0);
   if (is_enough()) return true;
   if (!is_outside && deadline->has_passed()) return false;

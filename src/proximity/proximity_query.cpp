@@ -179,7 +179,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   LinkQuery::OtherLinks nearest;
   double proven = kInfinity, proven_points = kInfinity;
   std::size_t best = count;
-  bool complete = true, all_in_regions = true, best_in_range = false;
+  bool complete = true, all_in_regions = true, best_in_range = false, may_be_inside = false;
   // The link that was nearest last time comes first: its upper bound prunes most of the others.
   const std::size_t first = impl_->last_nearest;
   for (std::size_t k = 0; k < count; ++k) {
@@ -193,6 +193,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
     if (best == count) link.warm_start(clouds);
     complete = link.run(clouds, Goal::kTolerance, &deadline) && complete;
     all_in_regions = all_in_regions && link.is_inside_regions();
+    may_be_inside = may_be_inside || link.may_be_inside();
     proven = std::min(proven, link.proven_bound());
     proven_points = std::min(proven_points, link.proven_points_bound());
     nearest.extents = std::min(nearest.extents, link.extent_distance());
@@ -211,7 +212,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
     result->link = static_cast<std::int32_t>(best);
     lower(result->all_known ? proven : -kInfinity, proven_points, &answer);
     impl_->last_nearest = best;
-  } else if (!complete || !all_in_regions || !result->all_known) {
+  } else if (!complete || !all_in_regions || !result->all_known || may_be_inside) {
     answer.reset();
   }
   return complete;

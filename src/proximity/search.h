@@ -87,6 +87,8 @@ class Search {
   // A search that has visited so many tiles and measured nothing measures an obstacle: the link's
   // supporting plane across its direction may separate the link from all others, as from a table.
   static constexpr std::uint64_t kTilesBeforePlane = 4;
+  // A search turns the plane each time that it has measured so many: that costs as much as one.
+  static constexpr int kMeasuredBeforePlane = 4;
 
   // Begins with what the front does not prune, or with the root.
   void begin() {
@@ -140,7 +142,6 @@ class Search {
     outcome_.has_time = outcome_.has_time && measure_.has_time(bound);
     if (!outcome_.has_time) return prune(entry, bound, entry.outside);
     if (is_place_of_last(entry)) return keep(entry, last_.bound, last_.outside);
-    if (entry.lane != kNoObstacle) return measure(entry, bound);
     if (has_new_plane_) {
       const float height = bounds_.height(entry);
       // Near holes no plane tells inside from outside.
@@ -148,6 +149,7 @@ class Search {
         return prune(entry, height, link_.is_closed ? height : entry.outside);
       }
     }
+    if (entry.lane != kNoObstacle) return measure(entry, bound);
     if (entry.child < 0) {
       visit_tile(entry);
     } else {
@@ -314,7 +316,7 @@ class Search {
     const auto k = static_cast<int>(least - bounds.distance);
     if (!(bounds.outside[k] > 0.0F) || !(*least < limit_)) return 0;
     measure(obstacle(box, part, tile, bounds, k), *least);
-    has_new_plane_ = measure_.turn_plane(&link_) || has_new_plane_;
+    turn_plane();
     return 1U << static_cast<unsigned>(k);
   }
 
@@ -339,7 +341,10 @@ class Search {
     remember(entry, measured, entry.outside);
     keep(entry, measured, entry.outside);
     take_limit();
+    if (measured_ % kMeasuredBeforePlane == 0) turn_plane();
   }
+
+  void turn_plane() { has_new_plane_ = measure_.turn_plane(&link_) || has_new_plane_; }
 
   void remember(const Entry& entry, float bound, float outside) {
     last_ = {true, {entry.min[0], entry.min[1], entry.min[2]}, bound, outside};

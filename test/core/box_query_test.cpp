@@ -208,6 +208,42 @@ TEST(Boxes, ThroughAnOpening) {
   EXPECT_GT(beside, test::scaled(300));
 }
 
+// The same box, where its surface is out of range: it is not CLEAR, and neither is the robot. Where
+// boxes have an extent, that of a box which may be inside counts from its deepest place.
+TEST(Boxes, ThroughAnOpeningOutOfRange) {
+  const LinkGeometry open{{test::open_box({0.4, 0.4, 0.2}), Eigen::Isometry3d::Identity(), "open"}};
+  const auto model = test::model_of({open, test::one(Sphere{0.01})}, 0.01);
+  const Solid solid(open);
+  const std::vector<Eigen::Isometry3d> X_FL = {Eigen::Isometry3d::Identity(), test::at(5, 0, 0)};
+  std::vector<LinkProximity> results;
+  RobotProximity robot;
+  int inside = 0;
+  for (const double half : {0.005, 0.02, 0.05}) {
+    for (double low = 0.08; low < 0.1; low += 0.001) {
+      const Eigen::AlignedBox3d box(Eigen::Vector3d(-half, -half, low),
+                                    Eigen::Vector3d(half, half, low + 2.0 * half));
+      CloudSnapshot map = test::make_map({box});
+      const double truth = solid.signed_distance({0.0, 0.0, low}).distance;
+      inside += truth < 0.0 ? 1 : 0;
+      for (const double range : {0.02, 1.0}) {
+        for (const double extent : {0.0, 0.2}) {
+          SCOPED_TRACE(testing::Message()
+                       << half << ", " << low << ", " << range << ", " << extent);
+          map.box_extent = extent;
+          QueryConfig config;
+          config.max_distance = range;
+          ProximityQuery query(model, config);
+          query.run(X_FL, {true, true}, {&map}, &results);
+          ASSERT_LE(results[0].lower_bound, truth - extent);
+          query.run_minimum(X_FL, {true, true}, {&map}, &robot);
+          ASSERT_LE(robot.nearest.lower_bound, truth - extent);
+        }
+      }
+    }
+  }
+  EXPECT_GT(inside, 30);
+}
+
 TEST(Boxes, TouchAndAlignment) {
   const auto model = test::make_model(
       {Box{{0.2, 0.2, 0.2}}, Shape(test::box({0.2, 0.2, 0.2})), Sphere{0.1}, Cylinder{0.1, 0.2}},

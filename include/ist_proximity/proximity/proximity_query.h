@@ -32,9 +32,10 @@ struct QueryConfig {
   double relative_tolerance = 0.0;
 };
 
-/// State of knowledge about a distance. UNKNOWN: no pose, no geometry, no cloud, or the deadline
-/// passed before anything was proven. CLEAR: nothing is within max_distance. NEAR: the distance is
-/// from 0 to max_distance. CONTACT: the distance is below 0.
+/// State of knowledge about a distance. UNKNOWN: no pose, no geometry, no cloud, the deadline
+/// passed before anything was proven, or a map's box may be inside through the opening of a mesh.
+/// CLEAR: nothing is within max_distance. NEAR: the distance is from 0 to max_distance. CONTACT:
+/// the distance is below 0.
 enum class LinkState : std::uint8_t { kUnknown = 0, kClear = 1, kNear = 2, kContact = 3 };
 
 /// Answer for one link; vectors and points in the fixed frame F unless said.
@@ -42,7 +43,8 @@ struct LinkProximity {
   LinkState state = LinkState::kUnknown;  ///< decides which of the other members are valid
   double distance;  ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
   /// [m] Proven; max_distance when CLEAR, -inf when UNKNOWN. Where points have an extent
-  /// (PointExtent), it is that of their spheres: it may be negative in NEAR then.
+  /// (PointExtent), it is that of their spheres. It may be negative in NEAR then, and where a map's
+  /// box may be inside through the opening of a mesh.
   double lower_bound;
   Eigen::Vector3d p_FCl;  ///< [m] closest point on the link; NaN unless NEAR or CONTACT
   Eigen::Vector3d p_LCl;  ///< [m] the same in the link's own frame
