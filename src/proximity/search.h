@@ -87,8 +87,9 @@ class Search {
   // A search that has visited so many tiles and measured nothing measures an obstacle: the link's
   // supporting plane across its direction may separate the link from all others, as from a table.
   static constexpr std::uint64_t kTilesBeforePlane = 4;
-  // A search turns the plane each time that it has measured so many: that costs as much as one.
-  static constexpr int kMeasuredBeforePlane = 4;
+  // A search that has measured so many turns the plane, and again each time that there are twice as
+  // many.
+  static constexpr int kMeasuredBeforePlane = 8;
 
   // Begins with what the front does not prune, or with the root.
   void begin() {
@@ -341,7 +342,7 @@ class Search {
     remember(entry, measured, entry.outside);
     keep(entry, measured, entry.outside);
     take_limit();
-    if (measured_ % kMeasuredBeforePlane == 0) turn_plane();
+    if (measured_ >= kMeasuredBeforePlane && (measured_ & (measured_ - 1)) == 0) turn_plane();
   }
 
   void turn_plane() { has_new_plane_ = measure_.turn_plane(&link_) || has_new_plane_; }
