@@ -35,10 +35,10 @@ Points read_all(const RawCloud& cloud) {
   return points;
 }
 
-int neighbors(const Points& points, std::size_t i, double radius, double max_range) {
+int neighbors(const Points& points, std::size_t i, double radius) {
   int count = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    count += k != i && points[k].norm() <= max_range && (points[k] - points[i]).norm() <= radius;
+    count += k != i && (points[k] - points[i]).norm() <= radius;
   }
   return count;
 }
@@ -56,7 +56,7 @@ std::uint32_t check(const RawCloud& cloud, const NoiseFilterConfig& config, doub
   EXPECT_EQ(after.size(), before.size());
   for (std::size_t i = 0; i < before.size(); ++i) {
     const bool is_noise = before[i].allFinite() && before[i].norm() <= max_range &&
-                          neighbors(before, i, config.radius, max_range) < config.neighbors;
+                          neighbors(before, i, config.radius) < config.neighbors;
     expected += is_noise;
     for (int k = 0; k < 3; ++k) {
       if (is_noise) {
@@ -109,6 +109,19 @@ TEST(NoiseFilter, FarFromTheSensor) {
   Points points = picture(24, 20, &rng);
   for (Eigen::Vector3d& p : points) p += Eigen::Vector3d(1e6, -2e6, 3e5);
   EXPECT_GT(check(raw(points, 24), {0.03, 4}, kInf), 0U);
+}
+
+// The largest range cuts through a surface: what lies beyond it is no obstacle, but shows that what
+// lies before it is one.
+TEST(NoiseFilter, NeighborsBeyondTheRange) {
+  Points points(5, Eigen::Vector3d(0.0, 0.0, 1.51));
+  points[2].z() = 1.49;
+  for (const std::size_t width : {std::size_t{5}, std::size_t{1}}) {
+    EXPECT_EQ(check(raw(points, width), {0.03, 4}, 1.5), 0U);
+    EXPECT_EQ(check(raw(points, width), {0.01, 4}, 1.5), 1U);
+  }
+  for (int i = 0; i < 40; ++i) points.insert(points.begin() + 3, Eigen::Vector3d(0.0, 0.0, 3.0));
+  EXPECT_EQ(check(raw(points, points.size()), {0.03, 4}, 1.5), 0U) << "found by a search";
 }
 
 TEST(NoiseFilter, NothingInRange) {

@@ -46,38 +46,38 @@ struct NoiseFilter::Impl {
   double radius_sq = 0.0;
   std::size_t width = 0, height = 0;
   std::vector<Eigen::Vector3d> points;   // by their numbers in the message
-  std::vector<bool> in_range;            // the same
+  std::vector<bool> is_counted;          // the same: whether a point may be a neighbor
   std::vector<std::uint32_t> undecided;  // numbers of the points that need a search
-  std::vector<CloudPoint> indexed;       // all points in range, from `origin`
+  std::vector<CloudPoint> indexed;       // those that may be neighbors, from `origin`
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   float slack = 0.0F;  // [m] of the index's boxes
   PointBvhBuilder builder;
   PointBvh index;
   using Stack = TraversalStack<std::int32_t, stack_capacity(kMaxBoxLevels, kBoxWidth)>;
 
-  void read(const RawCloud& cloud, double max_range);
+  void read(const RawCloud& cloud, double counted_range);
   bool is_neighbor(std::uint32_t a, std::uint32_t b) const {
     return (points[a] - points[b]).squaredNorm() <= radius_sq;
   }
   bool has_neighbors_beside(std::size_t row, std::size_t column) const;
-  void find_undecided();
+  void find_undecided(double max_range);
   void build_index();
   bool has_neighbors(std::uint32_t point) const;
   bool count_in_tile(const PointTile& tile, std::uint32_t point, int* count) const;
   RawCloud view(const RawCloud& of) const;
 };
 
-void NoiseFilter::Impl::read(const RawCloud& cloud, double max_range) {
+void NoiseFilter::Impl::read(const RawCloud& cloud, double counted_range) {
   width = cloud.width;
   height = cloud.height;
   points.clear();
-  in_range.clear();
+  is_counted.clear();
   points.reserve(cloud.size());
-  in_range.reserve(cloud.size());
+  is_counted.reserve(cloud.size());
   for (std::size_t row = 0; row < height; ++row) {
     for (std::size_t column = 0; column < width; ++column) {
       points.push_back(point_at(cloud, row, column));
-      in_range.push_back(is_within(points.back(), max_range));
+      is_counted.push_back(is_within(points.back(), counted_range));
     }
   }
 }
@@ -95,19 +95,19 @@ bool NoiseFilter::Impl::has_neighbors_beside(std::size_t row, std::size_t column
   for (std::size_t r = first_row; r <= last_row; ++r) {
     for (std::size_t c = first_column; c <= last_column; ++c) {
       const auto other = static_cast<std::uint32_t>(r * width + c);
-      if (other == self || !in_range[other] || !is_neighbor(self, other)) continue;
+      if (other == self || !is_counted[other] || !is_neighbor(self, other)) continue;
       if (++count >= config.neighbors) return true;
     }
   }
   return false;
 }
 
-void NoiseFilter::Impl::find_undecided() {
+void NoiseFilter::Impl::find_undecided(double max_range) {
   undecided.clear();
   for (std::size_t row = 0; row < height; ++row) {
     for (std::size_t column = 0; column < width; ++column) {
       const std::size_t i = row * width + column;
-      if (!in_range[i] || has_neighbors_beside(row, column)) continue;
+      if (!is_within(points[i], max_range) || has_neighbors_beside(row, column)) continue;
       undecided.push_back(static_cast<std::uint32_t>(i));
     }
   }
@@ -118,7 +118,7 @@ void NoiseFilter::Impl::build_index() {
   indexed.clear();
   float largest = 0.0F;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!in_range[i]) continue;
+    if (!is_counted[i]) continue;
     const Eigen::Vector3f p = (points[i] - origin).cast<float>();
     largest = std::max(largest, p.cwiseAbs().maxCoeff());
     indexed.push_back({p.x(), p.y(), p.z(), static_cast<std::uint32_t>(i)});
@@ -186,8 +186,8 @@ NoiseFilter::~NoiseFilter() = default;
 
 RawCloud NoiseFilter::run(const RawCloud& cloud, double max_range, std::uint32_t* dropped) {
   Impl& my = *impl_;
-  my.read(cloud, max_range);
-  my.find_undecided();
+  my.read(cloud, max_range + my.config.radius);  // neighbors may be farther than the points
+  my.find_undecided(max_range);
   *dropped = 0;
   if (my.undecided.empty()) return my.view(cloud);
   my.build_index();

@@ -33,7 +33,8 @@ class NoiseFilter {
   ~NoiseFilter();
 
   /// @param cloud      checked by check_layout or check_depth_image
-  /// @param max_range  [m] from the sensor: farther points stay as they are and are no neighbors
+  /// @param max_range  [m] from the sensor: farther points stay as they are; they are neighbors,
+  /// too
   /// @param dropped    number of finite points within the range that were taken for noise
   /// @returns the same points in the same order, with NaN for dropped ones; valid until the next
   ///          call
