@@ -233,6 +233,39 @@ TEST(MemoryMap, AClockThatIsSetBackLosesNothing) {
   EXPECT_FALSE(map.has_obstacles());
 }
 
+// Times are counted in ticks that last for a year; a clock that begins late, or jumps, needs more.
+TEST(MemoryMap, AClockThatIsSetForwardByYearsForgetsByTheDecayAlone) {
+  MemoryConfig config;
+  config.decay = kInfinity;
+  MemoryMap lasting(config);
+  lasting.insert(wall(1.0F, 1000.0));
+  for (const double now : {1.7e9, 1.8e9, 9e15}) {
+    lasting.forget(now);
+    EXPECT_EQ(lasting.state({1.01, 0.1, 0.1}), VoxelState::kOccupied) << now;
+    SeenSpace seen;
+    seen.add(lasting);
+    EXPECT_LE(seen.time_seen({1.01, 0.1, 0.1}), 1000.02) << "nothing gets newer";
+  }
+  lasting.insert(wall(0.5F, 9e15));
+  EXPECT_TRUE(hides(lasting, {1.01, 0.1, 0.1}));
+
+  for (const double decay :
+       {1e7, 3e7}) {  // [s] shorter and longer than half of what ticks last for
+    SCOPED_TRACE(decay);
+    config.decay = decay;
+    MemoryMap map(config);
+    map.insert(wall(-1.0F, 0.0));
+    map.insert(wall(1.0F, 4.1e7 - 0.9 * decay));
+    map.forget(4.1e7);
+    EXPECT_EQ(map.state({-1.01, 0.1, 0.1}), VoxelState::kUnknown);
+    EXPECT_EQ(map.state({1.01, 0.1, 0.1}), VoxelState::kOccupied);
+    map.forget(4.1e7 + 0.1 * decay - 1.0);
+    EXPECT_EQ(map.state({1.01, 0.1, 0.1}), VoxelState::kOccupied);
+    map.forget(4.1e7 + 0.1 * decay + 1.0);
+    EXPECT_EQ(map.state({1.01, 0.1, 0.1}), VoxelState::kUnknown);
+  }
+}
+
 TEST(MemoryMap, FreeSpaceIsForgottenAlone) {
   MemoryMap map{{}};
   map.insert(wall(1.0F, 100.0));

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Simulated time: no clock yet, a clock that stands still, and one that jumps back."""
 
+import os
+import tempfile
 import threading
 
 import numpy as np
@@ -11,6 +13,7 @@ from memory_test import BALL, FAR, LASTING, NEAR, VOXEL, distance_to
 from proximity_testing import LinkProximity, ProximityArray
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from velocity_filter_test import JOINTS, SLIDES, Filter
 from visualization_msgs.msg import MarkerArray
 
@@ -166,6 +169,34 @@ class ClockTest(pt.NodeTest):
                     self.assertLessEqual(ball(m).lower_bound, distance_to(FAR))
                 else:
                     self.assertTrue(pt.all_unknown(m))
+
+    # A node may begin before the clock does, and the clock at any time.
+    def test_memory_file_that_is_there_before_the_clock(self):
+        clock, world = self.clock, self.world
+        clock.start()
+        world.stand(pt.transform(BALL), pt.transform((0, 0, 5)))
+        world.points = FAR
+        world.start_tf()
+        world.start_clouds()
+        self.MAX_DISTANCE = 0.8
+        memory = dict(LASTING, file=os.path.join(tempfile.mkdtemp(), "memory.bt"))
+        parameters = dict(rate=50, links=["ball_link"], max_distance=0.8, memory=memory)
+        node = self.start(**parameters)
+        node.wait_for(lambda m: m.status == 0 and m.links[0].source == "cloud", "the far patch")
+        self.assertTrue(node.service("save_memory", Trigger)().success)
+        self.assertEqual(node.stop(), 0)
+
+        clock.stop()
+        world.points = NEAR  # the far patch is never seen by the next node
+        node = self.start(**parameters)
+        node.wait_for_unknown(ProximityArray.NO_CLOUD, "/clock")
+        node.next_messages(20)
+        clock.jump(1.7e9)
+        clock.start()
+        node.wait_for(lambda m: m.status == 0, "the clock")
+        for m in node.next_messages(20):
+            self.assertEqual(m.links[0].source, "cloud/memory")
+            self.assertLessEqual(m.links[0].lower_bound, distance_to(FAR))
 
     def test_filter_without_commands(self):
         """The last command is from the future then, and 0 is given all the same."""

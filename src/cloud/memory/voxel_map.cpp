@@ -129,6 +129,7 @@ void VoxelMap::clear_free() {
 
 void VoxelMap::shift_times(double seconds) {
   epoch_ += seconds;
+  first_ += seconds;
   now_ += seconds;
 }
 
@@ -142,16 +143,40 @@ std::uint32_t VoxelMap::tick(double time) const {
   return ticks >= 0.0 ? static_cast<std::uint32_t>(std::min(ticks, kMaxTicks)) : 0;  // NaN: 0
 }
 
-double VoxelMap::time(std::uint32_t tick) const { return epoch_ + kTick * tick; }
+double VoxelMap::time(std::uint32_t tick) const {
+  return tick == 0 ? first_ : epoch_ + kTick * tick;
+}
 
 void VoxelMap::set_now(double time) {
   if (!std::isfinite(time)) return;
-  if (std::isnan(now_) || (time - epoch_) / kTick >= kMaxTicks) {
+  if (std::isnan(now_)) {
     blocks_.clear();
     reset_cursor();
-    now_ = epoch_ = time;
+    now_ = epoch_ = first_ = time;
   }
   now_ = std::max(now_, time);
+  if ((now_ - epoch_) / kTick >= kMaxTicks) {
+    forget_old();
+    move_epoch(now_ - std::clamp(config_.decay, 0.5 * kTick * kMaxTicks, 0.8 * kTick * kMaxTicks));
+  }
+}
+
+/// Counts ticks from a later time on. What was measured before it stays, as old as the first of
+/// all, and is forgotten late: that is the case with a decay of more than a year alone.
+void VoxelMap::move_epoch(double epoch) {
+  const auto earlier =
+      static_cast<std::uint64_t>(std::min((epoch - epoch_) / kTick, 2.0 * kMaxTicks));
+  const auto moved = [earlier](std::uint32_t time) {
+    return time > earlier ? static_cast<std::uint32_t>(time - earlier) : 0U;
+  };
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    VoxelBlock& block = blocks_[i];
+    for_each_bit(BlockBits(block.known),
+                 [&](unsigned place) { block.time[place] = moved(block.time[place]); });
+    block.oldest = moved(block.oldest);
+    block.newest = moved(block.newest);
+  }
+  epoch_ = epoch;
 }
 
 bool VoxelMap::is_inside(const VoxelKey& key) const {

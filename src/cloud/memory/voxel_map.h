@@ -52,6 +52,7 @@ class VoxelMap {
   };
 
   std::uint32_t tick(double time) const;
+  void move_epoch(double epoch);
   bool is_inside(const VoxelKey& key) const;
   VoxelBlock* block_for(const VoxelKey& key);
   void mark(const VoxelKey& key, BlockBits VoxelBlock::*bits);
@@ -78,6 +79,7 @@ class VoxelMap {
   VoxelKey low_{0, 0, 0}, high_{kKeyEnd - 1, kKeyEnd - 1, kKeyEnd - 1};  ///< of the region
   double now_ = std::numeric_limits<double>::quiet_NaN();
   double epoch_ = 0.0;  ///< [s] at which ticks begin
+  double first_ = 0.0;  ///< [s] before which nothing was measured
   std::uint32_t frame_ = 1;
   std::size_t forgotten_ = 0, skipped_ = 0, lost_ = 0;
   std::size_t added_ = 0;  ///< blocks that the last cloud added

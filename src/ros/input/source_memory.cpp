@@ -94,6 +94,8 @@ void SourceMemory::begin_target(const SourceTarget& target) {
     robot_ = target.model;
   }
   if (target.generation == generation_ && target.fixed_frame == fixed_frame_) return;
+  // What a file holds counts as measured when the clock begins.
+  if (generation_ == 0 && ros::Time::now().isZero()) return;
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::string frame_before = fixed_frame_;
   const bool is_first = generation_ == 0;
@@ -195,6 +197,7 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::share(const SnapshotRequest&
 std::string SourceMemory::insert(const Measurement& measurement, const Placement& placement,
                                  const SourceTarget& target, const SourceSnapshot& cloud) {
   const std::string fault = "the last " + std::string(noun(config_.type)) + " is not remembered: ";
+  if (generation_ == 0) return fault + "the ROS clock has not started";
   for (std::size_t i = 0; i < placement.known.size(); ++i) {
     const LinkModel& link = target.model->links[i];
     if (is_pending(link)) {
