@@ -7,7 +7,7 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from joint_states_test import ARM, arm_poses
-from proximity_testing import ProximityArray
+from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import JointState
 
 from ist_proximity.srv import QueryProximity
@@ -217,6 +217,43 @@ class QueryTest(pt.NodeTest):
             stamp = result.header.stamp
             self.assertIn(stamp, self.world.tf_sent)
             self.check(result, {"turn": begin - stamp.to_sec(), "slide": NOW["slide"]})
+
+    def check_astray(self):
+        """The mimic joint is 0.5 m from where its formula puts it."""
+        now = dict(NOW, follow=-1.5 * NOW["slide"] - 1.0)
+        self.check(self.ask({"turn": 1.0}).results[0], dict(now, turn=1.0))
+        q = {"slide": 0.2, "follow": -1.0}
+        self.check(self.ask(q).results[0], dict(now, **q))
+        for q in (NOW, {"slide": 0.2}):  # states alone what leads it
+            answer = self.ask(q, self_proximity=True)
+            (result,) = answer.results
+            self.assertEqual(result.status, ProximityArray.NO_POSE)
+            self.assertIn("as a mimic of joint 'slide'", result.status_text)
+            pt.check_invariants(self, result, 3.0)
+            self.assertEqual(pt.link(result, "box_link").state, LinkProximity.UNKNOWN)
+            self.assertNotEqual(pt.link(result, "ball_link").state, LinkProximity.UNKNOWN)
+            self.assertEqual([pair.state for pair in answer.pairs], [LinkProximity.UNKNOWN])
+        answer = self.ask(q, {"slide": 0.4}, times=[0.0, 1.0], self_proximity=True)
+        times = list(answer.impact_times) + list(answer.pair_impact_times)
+        self.assertTrue(np.isnan(times).all(), times)
+
+    def test_a_mimic_joint_elsewhere_in_tf(self):
+        self.start()
+        self.tf()
+        to_column = pt.inverse(pt.transform((0, 0, 0.5)))
+        place = lambda off: to_column @ arm_poses(0, 0, -1.5 * NOW["slide"] - 0.5 + off)["box_link"]  # noqa: E731
+        self.world.poses["box_link"] = ("column", place(-0.5))
+        self.node.wait_for_status(ProximityArray.OK)
+        pt.wait_until(lambda: self.ask({}).results[0].status == 0, "an answer")
+        self.check_astray()
+        self.world.poses["box_link"] = ("column", place(-0.02))  # within the tolerance
+        pt.wait_until(lambda: self.ask({"slide": 0.2}).results[0].status == 0, "a known box")
+
+    def test_a_mimic_joint_elsewhere_in_joint_states(self):
+        self.start(pose_source="joint_states")
+        self.world.start_joints(dict(NOW, follow=-1.5 * NOW["slide"] - 1.0))
+        self.node.wait_for_status(ProximityArray.OK)
+        self.check_astray()
 
     def test_joint_states(self):
         self.start(pose_source="joint_states")

@@ -71,11 +71,15 @@ class TrajectoryTest(pt.NodeTest):
         self.start_time = rospy.Time.now() + rospy.Duration(1e6)
         self.at_rest = self.turn = 0.0
         self.speeds = [0.0, 0.0]
+        self.astray = None  # [m] from where the mimic joint would be; None: nobody states it
 
     def slide(self):
         """Where the robot is: it follows its trajectory."""
         time_now = (rospy.Time.now() - self.start_time).to_sec()
         return FAR * min(max(time_now / DURATION, 0.0), 1.0) + self.at_rest
+
+    def follow(self):
+        return {} if self.astray is None else {"follow": -1.5 * self.slide() - 0.5 + self.astray}
 
     def start(self, urdf=ARM, **parameters):
         super().start(urdf, pose_source="joint_states", self_filter=False, **parameters)
@@ -86,7 +90,7 @@ class TrajectoryTest(pt.NodeTest):
         )
         self.sender = rospy.Publisher(self.node.name + "/trajectory", JointTrajectory, queue_size=1)
         self.world.start_joints(
-            lambda: {"turn": self.turn, "slide": self.slide()}, velocities=self.speeds
+            lambda: {"turn": self.turn, "slide": self.slide(), **self.follow()}, velocities=self.speeds
         )
         self.world.start_points(lambda: self.points)
         self.node.wait_for_status(0)
@@ -329,6 +333,19 @@ class TrajectoryTest(pt.NodeTest):
         self.sender.publish(JointTrajectory())
         self.wait(lambda m: m.state == m.NONE, "the end of the watch", begin)
         self.assertEqual(self.heard[-1].text, "no trajectory is watched")
+
+    def test_a_mimic_joint_elsewhere_is_unknown(self):
+        self.points = np.array([[0.0, 0.9, 0.5]])
+        self.speeds, self.astray = [], 0.05
+        self.start()
+        self.send()
+        self.wait(lambda m: m.state == m.CLEAR, "a mimic joint within the tolerance", 0)
+        self.astray = 0.3
+        told = self.wait(lambda m: m.state != m.CLEAR, "a mimic joint elsewhere")
+        self.assertEqual(told.state, told.UNKNOWN)
+        self.assertIn("as a mimic of joint 'slide'", told.text)
+        self.astray = 0.0
+        self.wait(lambda m: m.state == m.CLEAR, "one that follows")
 
     def test_without_clouds_nothing_is_known(self):
         self.start(trajectory={"tolerance": 1.0})

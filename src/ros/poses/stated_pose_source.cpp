@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ros/poses/mimic_agreement.h"
 #include "ros/poses/position_limits.h"
 #include "ros/poses/transforms.h"
 
@@ -10,9 +11,11 @@ namespace ist {
 
 StatedPoseSource::StatedPoseSource(std::shared_ptr<const Kinematics> kinematics,
                                    const TransformBuffer& buffer, const std::string& fixed_frame,
-                                   const std::vector<std::string>& links, double timeout)
+                                   const std::vector<std::string>& links, double timeout,
+                                   double mimic_tolerance)
     : KinematicPoseSource(std::move(kinematics), buffer, fixed_frame, links,
                           std::vector<bool>(links.size(), true), timeout),
+      mimic_tolerance_(mimic_tolerance),
       q_(kinematics_->joints().size(), std::nan("")) {}
 
 std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration) {
@@ -44,9 +47,49 @@ std::string StatedPoseSource::hint() const {
   return "state its position, or provide it on tf or joint_states";
 }
 
+/// Compares where tf has a mimic joint with its formula, at the newest instant that tf knows of it
+/// and of its source.
+/// @returns empty where it follows, or is not in tf; else a sentence
+std::string StatedPoseSource::why_strays(std::size_t joint, const ros::Time& now) const {
+  const auto& bodies = kinematics_->bodies();
+  const Kinematics::Joint& mimic = kinematics_->joints()[joint];
+  const Kinematics::Joint& source = kinematics_->joints()[mimic.source];
+  Eigen::Isometry3d X_mimic, X_source;
+  ros::Time stamp, source_stamp;
+  const std::string &parent = bodies[mimic.parent], &child = bodies[mimic.child];
+  if (!look_up_newest(buffer_, parent, child, now, timeout_, &X_mimic, &stamp).empty()) return "";
+  std::string why = look_up_newest(buffer_, bodies[source.parent], bodies[source.child], now,
+                                   timeout_, &X_source, &source_stamp);
+  if (why.empty() && !stamp.isZero() && !source_stamp.isZero()) {
+    const ros::Time common = std::min(stamp, source_stamp);
+    why = ist::look_up(buffer_, parent, child, common, &X_mimic);
+    if (why.empty()) {
+      why = ist::look_up(buffer_, bodies[source.parent], bodies[source.child], common, &X_source);
+    }
+  }
+  if (!why.empty()) return "whether joint '" + mimic.name + "' follows is not known: " + why;
+  return why_not_led(*kinematics_, joint, X_source, X_mimic, mimic_tolerance_);
+}
+
+/// Mimic joints that are elsewhere now than their formula says will hardly follow it: nobody knows
+/// where they will be.
+void StatedPoseSource::check_mimics(const ros::Time& now, std::vector<PoseProblem>* problems) {
+  const auto& joints = kinematics_->joints();
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const std::size_t source = joints[j].source;
+    if (source == j || !std::isnan(q_[j]) || std::isnan(q_[source])) continue;
+    std::string why = why_strays(j, now);
+    if (why.empty()) continue;
+    (*problems)[j] = {why, true};
+    joints_.known[j] = false;
+    mimics_follow_ = false;
+  }
+}
+
 void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   reset(now, poses);
   root_known_ = false;
+  mimics_follow_ = true;
   kinematics_->place_joints(q_, &joints_);
   if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
   const auto& bodies = kinematics_->bodies();
@@ -81,6 +124,7 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
       why.insert(0, "joint '" + joints[j].name + "' is not stated, and not known now: ");
     }
   }
+  check_mimics(now, &joint_problems);
   poses->stamp = instant;
   place(joint_problems, poses);
 }

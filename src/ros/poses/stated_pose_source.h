@@ -13,12 +13,14 @@ namespace ist {
 /// Link poses of a configuration that a request states; the robot need not be in it. Joints that
 /// the request leaves out, planar and floating joints, and the pose of the root link in the fixed
 /// frame come from tf as they are now: at the newest instant at which it knows them all, which is
-/// that of the poses.
+/// that of the poses. A mimic joint of a stated joint follows it, unless it is elsewhere now than
+/// its formula says: then it is not known.
 class StatedPoseSource : public KinematicPoseSource {
  public:
+  /// @param mimic_tolerance  [rad, m] by which a mimic joint may be elsewhere now than led
   StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const TransformBuffer& buffer,
                    const std::string& fixed_frame, const std::vector<std::string>& links,
-                   double timeout);
+                   double timeout, double mimic_tolerance);
 
   /// @param wanted  by link: false leaves it unknown, without a problem
   void set_wanted(const std::vector<bool>& wanted) { wanted_ = wanted; }
@@ -33,14 +35,21 @@ class StatedPoseSource : public KinematicPoseSource {
   const JointPoses& joints() const { return joints_; }
   const Eigen::Isometry3d& X_FR() const { return X_FR_; }  ///< root link -> fixed frame
   bool is_root_known() const { return root_known_; }       ///< whether joints() and X_FR() hold
+  /// Whether a motion from there is known: they hold, and mimic joints follow.
+  bool is_motion_known() const { return root_known_ && mimics_follow_; }
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   bool is_stated() const override { return true; }
   std::string hint() const override;
 
  private:
+  std::string why_strays(std::size_t joint, const ros::Time& now) const;
+  void check_mimics(const ros::Time& now, std::vector<PoseProblem>* problems);
+
+  const double mimic_tolerance_;
   std::vector<double> q_;  ///< by joint; NaN where it is left out
   bool root_known_ = false;
+  bool mimics_follow_ = true;
 };
 
 }  // namespace ist

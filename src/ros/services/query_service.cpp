@@ -193,8 +193,8 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   first.reserve(wanted.size());
   for (const bool one : wanted) first.push_back(one ? kInfinity : std::nan(""));
   if (request.self_proximity != 0) self_.begin_motion();
-  JointPoses still;  // nothing is known of the motion while the root link has no pose
-  if (poses.is_root_known()) still = poses.joints();
+  JointPoses still;  // empty while nothing is known of the motion
+  if (poses.is_motion_known()) still = poses.joints();
   TimeOfImpact& times = stated_.impacts(query);
   std::vector<ImpactTime> impacts;
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {

@@ -20,7 +20,7 @@ std::string StatedCycle::take_model() {
   }
   auto poses = std::make_unique<StatedPoseSource>(
       model_->kinematics, node_.buffer, fixed_frame_of(*model_, node_.config),
-      link_names(*model_->robot), node_.config.pose_timeout);
+      link_names(*model_->robot), node_.config.pose_timeout, node_.config.trajectory.tolerance);
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(
       model_, node_.config, std::move(poses), CloudSelection::Reader::kOther,
@@ -52,8 +52,8 @@ TimeOfImpact& StatedCycle::impacts(const QueryConfig& query) {
 }
 
 std::vector<bool> StatedCycle::measurable() const {
-  // Nothing is known of the motion while the root link has no pose.
-  if (!poses_->is_root_known()) return std::vector<bool>(model_->robot->links.size(), false);
+  // Nothing is known of the motion while the root link has no pose, or a mimic joint strays.
+  if (!poses_->is_motion_known()) return std::vector<bool>(model_->robot->links.size(), false);
   return cycle_->measurable();
 }
 
