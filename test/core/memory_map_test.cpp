@@ -255,9 +255,10 @@ TEST(MemoryMap, AClockThatIsSetForwardByYearsForgetsByTheDecayAlone) {
     config.decay = decay;
     MemoryMap map(config);
     map.insert(wall(-1.0F, 0.0));
+    ASSERT_EQ(map.state({-0.99, 0.1, 0.1}), VoxelState::kOccupied);
     map.insert(wall(1.0F, 4.1e7 - 0.9 * decay));
     map.forget(4.1e7);
-    EXPECT_EQ(map.state({-1.01, 0.1, 0.1}), VoxelState::kUnknown);
+    EXPECT_EQ(map.state({-0.99, 0.1, 0.1}), VoxelState::kUnknown);
     EXPECT_EQ(map.state({1.01, 0.1, 0.1}), VoxelState::kOccupied);
     map.forget(4.1e7 + 0.1 * decay - 1.0);
     EXPECT_EQ(map.state({1.01, 0.1, 0.1}), VoxelState::kOccupied);
