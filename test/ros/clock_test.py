@@ -142,8 +142,7 @@ class ClockTest(pt.NodeTest):
         self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.UNKNOWN)
         future.stop()
 
-    # What is hidden from the camera is remembered, whatever the clock does.
-    def test_memory_of_a_clock_that_is_set_back(self):
+    def show_far_patch(self):
         clock, world = self.clock, self.world
         clock.start()
         world.stand(pt.transform(BALL), pt.transform((0, 0, 5)))
@@ -151,6 +150,11 @@ class ClockTest(pt.NodeTest):
         world.start_tf()
         world.start_clouds()
         self.MAX_DISTANCE = 0.8
+        return clock, world
+
+    # What is hidden from the camera is remembered, whatever the clock does.
+    def test_memory_of_a_clock_that_is_set_back(self):
+        clock, world = self.show_far_patch()
         node = self.start(rate=50, links=["ball_link"], max_distance=0.8, memory=LASTING)
         ball = lambda m: pt.link(m, "ball_link")  # noqa: E731
         node.wait_for(lambda m: m.status == 0 and ball(m).source == "cloud", "the far patch")
@@ -172,13 +176,7 @@ class ClockTest(pt.NodeTest):
 
     # A node may begin before the clock does, and the clock at any time.
     def test_memory_file_that_is_there_before_the_clock(self):
-        clock, world = self.clock, self.world
-        clock.start()
-        world.stand(pt.transform(BALL), pt.transform((0, 0, 5)))
-        world.points = FAR
-        world.start_tf()
-        world.start_clouds()
-        self.MAX_DISTANCE = 0.8
+        clock, world = self.show_far_patch()
         memory = dict(LASTING, file=os.path.join(tempfile.mkdtemp(), "memory.bt"))
         parameters = dict(rate=50, links=["ball_link"], max_distance=0.8, memory=memory)
         node = self.start(**parameters)
