@@ -13,8 +13,8 @@ namespace {
 // of winding numbers, which are 0.01 about, and larger for the quick one.
 constexpr double kSurelyOutside = 0.47;
 
-// Of one element; p_E [m] is in its frame. That no way crosses the surface holds a closed element's
-// places on one side.
+// The margin of one element, about p_E [m] in its frame. A way that does not cross the surface
+// stays on one side of a closed element.
 SideMargin measure(const SolidElement& element, const Eigen::Vector3d& p_E, double largest,
                    bool also_inside) {
   if (element.is_closed) {

@@ -94,7 +94,7 @@ void SourceMemory::begin_target(const SourceTarget& target) {
     robot_ = target.model;
   }
   if (target.generation == generation_ && target.fixed_frame == fixed_frame_) return;
-  // What a file holds counts as measured when the clock begins.
+  // The file is read when the clock begins: what it holds counts as measured then.
   if (generation_ == 0 && ros::Time::now().isZero()) return;
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::string frame_before = fixed_frame_;

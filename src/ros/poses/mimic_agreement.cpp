@@ -21,27 +21,11 @@ double position_in(const Kinematics::Joint& joint, const Eigen::Isometry3d& X_PC
 
 }  // namespace
 
-double distance_between(const Kinematics::Joint& joint, double present, double q) {
-  const double way = present - q;
-  return joint.type == JointType::kContinuous ? std::remainder(way, kTurn) : way;
-}
-
-std::string why_not_led(const Kinematics& kinematics, std::size_t mimic, double source,
-                        double stated, double tolerance) {
-  const Kinematics::Joint& joint = kinematics.joints()[mimic];
-  const bool is_moved = joint.type != JointType::kFixed && !joint.has_unstated_pose();
-  if (std::isnan(stated) || !is_moved) return "";
-  const double led = joint.multiplier * source + joint.offset;
-  if (std::abs(distance_between(joint, stated, led)) <= tolerance) return "";
-  return format_text("joint '%s' is stated at %.3f, but would be at %.3f as a mimic of joint '%s'",
-                     joint.name.c_str(), stated, led,
-                     kinematics.joints()[joint.source].name.c_str());
-}
-
 std::string why_not_led(const Kinematics& kinematics, std::size_t mimic,
                         const Eigen::Isometry3d& X_source, const Eigen::Isometry3d& X_stated,
                         double tolerance) {
   const Kinematics::Joint& joint = kinematics.joints()[mimic];
+  if (joint.type == JointType::kFixed || joint.has_unstated_pose()) return "";
   const Kinematics::Joint& leader = kinematics.joints()[joint.source];
   double source = position_in(leader, X_source), stated = position_in(joint, X_stated);
   const auto led = [&] { return joint.multiplier * source + joint.offset; };
@@ -55,7 +39,9 @@ std::string why_not_led(const Kinematics& kinematics, std::size_t mimic,
     }
   }
   if (turns(joint)) stated -= kTurn * std::round((stated - led()) / kTurn);
-  return why_not_led(kinematics, mimic, source, stated, tolerance);
+  if (std::abs(stated - led()) <= tolerance) return "";
+  return format_text("joint '%s' is stated at %.3f, but would be at %.3f as a mimic of joint '%s'",
+                     joint.name.c_str(), stated, led(), leader.name.c_str());
 }
 
 }  // namespace ist

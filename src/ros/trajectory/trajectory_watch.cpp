@@ -12,7 +12,6 @@
 #include "ros/common/stopwatch.h"
 #include "ros/common/text.h"
 #include "ros/model/counted_links.h"
-#include "ros/poses/mimic_agreement.h"
 
 namespace ist {
 namespace {
@@ -127,23 +126,6 @@ std::string TrajectoryWatch::why_elsewhere(double time) const {
         "the robot does not follow the trajectory: joint '%s' is at %.3f and should be at %.3f, "
         "more than %g away",
         name.c_str(), q_now, q[joint], config_.trajectory.tolerance);
-  }
-  return why_not_led();
-}
-
-// The trajectory moves the mimics of its joints. @returns empty, or which of them is elsewhere
-std::string TrajectoryWatch::why_not_led() const {
-  const std::vector<Kinematics::Joint>& joints = model_->kinematics->joints();
-  const std::vector<std::size_t>& moved = trajectory_.joints;
-  const auto is_named = [&moved](std::size_t joint) {
-    return std::find(moved.begin(), moved.end(), joint) != moved.end();
-  };
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    const Kinematics::Joint& one = joints[j];
-    if (one.source == j || is_named(j) || !is_named(one.source)) continue;
-    std::string why = ist::why_not_led(*model_->kinematics, j, present(joints[one.source].name).q,
-                                       present(one.name).q, config_.trajectory.tolerance);
-    if (!why.empty()) return why;
   }
   return "";
 }

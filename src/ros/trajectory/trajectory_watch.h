@@ -53,7 +53,6 @@ class TrajectoryWatch : public AddOn {
   JointMotionNow present(const std::string& joint) const;
   std::string take_trajectory();
   std::string why_elsewhere(double time) const;
-  std::string why_not_led() const;
   void look(const ros::Time& now, Message* message);
   double obstacle_age(const ros::Time& now, double time) const;
   void fill(const std::vector<LinkClearance>& found, const std::vector<bool>& moved, double now,

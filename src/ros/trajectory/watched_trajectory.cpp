@@ -6,7 +6,6 @@
 #include "internal/geometry/limits.h"
 #include "internal/geometry/numbers.h"
 #include "ros/common/text.h"
-#include "ros/poses/mimic_agreement.h"
 
 namespace ist {
 namespace {
@@ -99,6 +98,11 @@ sensor_msgs::JointState WatchedTrajectory::state(const Kinematics& kinematics, d
     message.position.push_back(q[joint]);
   }
   return message;
+}
+
+double distance_between(const Kinematics::Joint& joint, double present, double q) {
+  const double way = present - q;
+  return joint.type == JointType::kContinuous ? std::remainder(way, 2.0 * M_PI) : way;
 }
 
 std::string read_trajectory(const Message& message, const Kinematics& kinematics,
