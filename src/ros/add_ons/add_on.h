@@ -35,7 +35,7 @@ class AddOn {
 
   /// Begins to receive what is answered slowly, by a queue whose thread ends before the add-on.
   virtual void subscribe(ros::CallbackQueue* /*queue*/) {}
-  /// Goes on where something is due. That thread calls it every 10 ms or more often.
+  /// Goes on where something is due. That thread calls it 20 times a second or more often.
   virtual void run_when_due() {}
 
   /// The newest distances of link against link; null: none of this model. Thread safe.

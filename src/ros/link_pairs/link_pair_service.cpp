@@ -102,8 +102,8 @@ void LinkPairService::sample(Findings* findings) {
   const std::string apart = left_out_though_apart(*findings);
   if (apart.empty()) return;
   ROS_WARN_STREAM(
-      "self-collision: in contact with all joints at zero, and therefore not watched, "
-      "but apart in other configurations: "
+      "self-collision: in contact at rest (all joints at zero or at the limit next to it), and "
+      "therefore not watched, but apart in other configurations: "
       << apart << "; enable_collisions of an SRDF watches them");
 }
 

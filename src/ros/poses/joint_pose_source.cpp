@@ -43,7 +43,7 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
 }
 
 std::string JointPoseSource::hint() const {
-  return "does everything that moves joints publish on '" + listener_.report().topic + "'?";
+  return "does everything that moves joints publish on '" + listener_.topic() + "'?";
 }
 
 /// Says why a joint's newest position cannot be used, whatever the other joints' are.

@@ -93,8 +93,13 @@ bool JointStateListener::is_waiting() {
   return !waiting_.empty();
 }
 
+std::string JointStateListener::topic() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return report_.topic;
+}
+
 JointStateReport JointStateListener::report() {
-  const std::uint32_t publishers = subscriber_.getNumPublishers();  // it can wait for the master
+  const std::uint32_t publishers = subscriber_.getNumPublishers();
   const std::lock_guard<std::mutex> lock(mutex_);
   JointStateReport report = report_;
   report.publishers = publishers;

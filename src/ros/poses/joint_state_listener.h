@@ -105,6 +105,9 @@ class JointStateListener {
   /// Takes the oldest message that waits, or the newest positions when none does.
   void take_next();
 
+  /// Gives the resolved topic, without waiting for the master.
+  std::string topic();
+  /// Gives the counts. It can wait for the master, which the cycle must not.
   JointStateReport report();
 
  private:
