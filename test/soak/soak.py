@@ -215,16 +215,18 @@ class Node:
         if nodelet:
             program = pt.find_program("nodelet", "nodelet")
             command = [manager] if manager else [program, "manager"]
-            self.start(wrapper + command + ["__name:=manager"])
+            # As proximity.launch starts a manager.
+            self.start(wrapper + command + ["__name:=manager"], MALLOC_ARENA_MAX="2")
             self.start([program, "load", "ist_proximity/Proximity", "manager", "__name:=proximity"])
         else:
             program = pt.find_program("ist_proximity", "proximity_node")
             self.start(wrapper + [program, "__name:=proximity"])
         self.main = self._processes[0]
 
-    def start(self, command):
+    def start(self, command, **variables):
         self._processes.append(subprocess.Popen(
-            command + self.REMAP, stdout=self._log, stderr=subprocess.STDOUT))
+            command + self.REMAP, env=dict(os.environ, **variables), stdout=self._log,
+            stderr=subprocess.STDOUT))
 
     def stop(self):
         """Returns the exit code; None when it does not end."""
