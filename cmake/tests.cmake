@@ -78,7 +78,11 @@ function(ist_proximity_gtest test)
     add_test(NAME ${test} COMMAND ${test} ${arguments})
     set(ctest_name ${test})
   endif()
-  set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT 600)
+  set(timeout 600)
+  if(IST_PROXIMITY_SANITIZE)
+    set(timeout 3600)  # packing takes thirty times as long
+  endif()
+  set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT ${timeout})
   ist_proximity_cost(${ctest_name}
     packer 30 accuracy_doc 25 closed_loop 20 contact_known 16 link_pair_exact 13 contact_of_links 12)
 endfunction()
