@@ -48,19 +48,24 @@ void JointHistory::add(const sensor_msgs::JointState& message, const ros::Time& 
       disputed_[*joint] = messages_;
     }
     if (disputed_[*joint] == messages_) continue;
-    ros::Time stamp = is_ahead ? now : sent;
-    if (!samples.empty()) {
-      // After a publisher whose clock was ahead, one whose clock is right is new all the same.
-      const Sample& last = samples.back();
-      const bool was_ahead = last.sent > last.stamp;
-      if (sent < last.sent && (!was_ahead || stamp < last.stamp)) continue;
-      stamp = std::max(stamp, last.stamp);
-      if (sent == last.sent) samples.pop_back();
-    }
-    samples.push_back({stamp, sent, message.position[i], messages_});
-    while (samples.size() > 1 && seconds_between(samples[1].stamp, stamp) > kKept) {
-      samples.pop_front();
-    }
+    append({is_ahead ? now : sent, sent, message.position[i], messages_}, &samples);
+  }
+}
+
+/// Adds the sample of a joint, unless it is older than the last one, and drops what is older than
+/// kKept.
+void JointHistory::append(Sample sample, Samples* samples) {
+  if (!samples->empty()) {
+    // After a publisher whose clock was ahead, one whose clock is right is new all the same.
+    const Sample& last = samples->back();
+    const bool was_ahead = last.sent > last.stamp;
+    if (sample.sent < last.sent && (!was_ahead || sample.stamp < last.stamp)) return;
+    sample.stamp = std::max(sample.stamp, last.stamp);
+    if (sample.sent == last.sent) samples->pop_back();
+  }
+  samples->push_back(sample);
+  while (samples->size() > 1 && seconds_between((*samples)[1].stamp, sample.stamp) > kKept) {
+    samples->pop_front();
   }
 }
 

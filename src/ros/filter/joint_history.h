@@ -58,6 +58,7 @@ class JointHistory {
   };
   using Samples = std::deque<Sample>;
 
+  static void append(Sample sample, Samples* samples);
   bool is_of_one_message(const ros::Time& stamp) const;
   bool note_ahead(const Samples& samples, const ros::Time& stamp, double* moved) const;
 
