@@ -4,8 +4,8 @@
 #include "ist_proximity/ros/proximity_server.h"
 
 int main(int argc, char** argv) {
-  // The allocator gives each busy thread an arena, and none returns its gaps to another: clouds go
-  // from the thread that receives to the one that indexes, so that nine arenas grow for one cloud.
+  // With an arena for each busy thread, what one has freed does not serve the others: memory goes
+  // up and down by several megabytes under load. `scripts/soak` shows it.
 #ifdef M_ARENA_MAX
   mallopt(M_ARENA_MAX, 2);
 #endif
