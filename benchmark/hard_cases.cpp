@@ -30,6 +30,7 @@ constexpr std::array kDistances = {0.3, 0.05, 0.02, 0.005, 0.002, 0.0005, -0.001
 
 struct Options {
   std::string folder, cache, only;
+  double max_distance = QueryConfig().max_distance;  // [m]
   bool quick = false;
 };
 
@@ -92,9 +93,10 @@ std::size_t write_stopped(const HardScene& scene, const Setting& setting, const 
   return wrong;
 }
 
-Setting hard_setting(bool quick) {
+Setting hard_setting(const Options& options) {
   Setting setting;
-  if (!quick) return setting;
+  setting.max_distance = options.max_distance;
+  if (!options.quick) return setting;
   setting.steps = 50;
   setting.cold = setting.images = 3;
   setting.budget = 0.3;
@@ -102,8 +104,10 @@ Setting hard_setting(bool quick) {
   return setting;
 }
 
-Setting deadline_setting(bool quick) {
+Setting deadline_setting(const Options& options) {
+  const bool quick = options.quick;
   Setting setting;
+  setting.max_distance = options.max_distance;
   setting.steps = quick ? 60 : 1000;
   setting.cold = quick ? 5 : 20;
   setting.images = quick ? 5 : 100;
@@ -122,7 +126,7 @@ std::size_t measure_scene(const HardScene& scene, const Options& options, CsvFil
   for (const double noise : kNoises) {
     if (scene.is_recorded && noise > 0.0) continue;
     for (const double tolerance : kTolerances) {
-      Setting setting = hard_setting(options.quick);
+      Setting setting = hard_setting(options);
       setting.noise = noise;
       setting.tolerance = tolerance;
       Measured measured;
@@ -130,7 +134,7 @@ std::size_t measure_scene(const HardScene& scene, const Options& options, CsvFil
       write_times(scene, setting, measured, hard);
       wrong += measured.checked.wrong;
     }
-    Setting setting = deadline_setting(options.quick);
+    Setting setting = deadline_setting(options);
     setting.noise = noise;
     Measured measured;
     measure(scene, model, setting, &measured);
@@ -142,13 +146,13 @@ std::size_t measure_scene(const HardScene& scene, const Options& options, CsvFil
 // By tolerance: what is measured with the nearest link at `distance` [m], in all frames.
 std::array<Measured, kTolerances.size()> measure_near(
     const MovingRobot& robot, const std::shared_ptr<const RobotModel>& model, double distance,
-    const std::vector<Scene>& frames, bool quick) {
+    const std::vector<Scene>& frames, const Options& options) {
   constexpr std::size_t kLeastSteps = 8, kMostSteps = 36;  // shorter parts are left out
   std::array<Measured, kTolerances.size()> all;
   for (const Scene& scene : frames) {
     CloudSnapshot cloud;
     Ingest(test::whole_cloud(false)).run(scene.frame.raw(), scene.frame.X_FS, {}, 0.0, &cloud);
-    for (std::size_t part = 0; part < (quick ? 3 : 12); ++part) {
+    for (std::size_t part = 0; part < (options.quick ? 3 : 12); ++part) {
       std::vector<Poses> motion = robot.part(part);
       motion.resize(std::min(motion.size(), kMostSteps));
       motion = kept_at(distance, motion, model, cloud);
@@ -157,6 +161,7 @@ std::array<Measured, kTolerances.size()> measure_near(
         return motion[static_cast<std::size_t>(std::lround(1e3 * time))];
       };
       Setting setting;
+      setting.max_distance = options.max_distance;
       setting.steps = motion.size() - 1;
       setting.cold = setting.images = 1;
       setting.checks = part == 0 ? 1 : 0;
@@ -178,7 +183,7 @@ std::size_t measure_near(const std::filesystem::path& data, const Options& optio
     const auto model = packed(robot.robot, options.cache, kMaxError);
     for (const double distance : kDistances) {
       std::fprintf(stderr, "%s, nearest link at %g mm\n", robot.name.c_str(), 1e3 * distance);
-      const auto measured = measure_near(robot, model, distance, frames, options.quick);
+      const auto measured = measure_near(robot, model, distance, frames, options);
       for (std::size_t t = 0; t < measured.size(); ++t) {
         wrong += measured[t].checked.wrong;
         for (std::size_t asked = 0; asked < kAsked; ++asked) {
@@ -225,6 +230,7 @@ int main(int argc, char** argv) {
   ist::benchmark::CommandLine line("Queries in hard scenes, near and touching, and out of time.");
   line.add_option("folder", options.folder, "Where CSV files are written")->required();
   line.add_option("cache", options.cache, "Folder that keeps packings")->required();
+  line.add_option("--max-distance", options.max_distance, "Of the queries [m]");
   line.add_flag("--quick", options.quick, "Fewer clouds and queries");
   line.add_option("--only", options.only, "A scene whose name contains this");
   line.read(argc, argv);

@@ -44,6 +44,7 @@ class Trial {
         ingest_(test::whole_cloud(false)),
         out_(out) {
     config_.tolerance = setting.tolerance;
+    config_.max_distance = setting.max_distance;
     for (Times& times : out->times) times.stopped.resize(setting.shares.size());
     next_image();
   }

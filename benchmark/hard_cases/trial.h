@@ -7,6 +7,7 @@
 
 #include "hard_cases/check.h"
 #include "hard_cases/scene.h"
+#include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/robot/robot_model.h"
 
 /// Times of the queries in one scene, and what they know when a deadline stops them.
@@ -23,6 +24,8 @@ struct Setting {
   std::size_t checks = 2;      ///< configurations whose answers are checked by brute force
   double budget = 2.0;         ///< [s] of each kind; then it ends, after one query at least
   std::vector<double> shares;  ///< deadlines, over the time of a query without; empty: none
+
+  double max_distance = QueryConfig().max_distance;  ///< [m]
 };
 
 /// How a query comes about.
