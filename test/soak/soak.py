@@ -42,7 +42,8 @@ NODE = NAMESPACE + "/proximity"
 STATUSES = ("OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR", "LOADING")
 # [s] A joint that comes at 1 kHz may be older than header.stamp by about twice its spacing.
 JOINT_LAG = 0.003
-# [s] Older than that, where the message says so: its bound is lower by what the joint may have moved.
+# [s] Older than that, where the message says so: its bound is lower by what the joint may have moved,
+# which is at least what its distance is off.
 TOLD_LAG = 0.05
 LAG_STEP = 1e-4  # [m] between the lags that are tried
 MANY = 1000  # complaints
@@ -145,7 +146,8 @@ class Checker:
         # Where a joint's positions come late or not at all, for up to some of its periods. A run that
         # is broken anyway is not looked at that closely.
         if sum(self.wrong.values()) < MANY:
-            is_told = one.lower_bound < one.distance - MARGIN - TOLERANCE - ROUNDING
+            off = abs(one.distance - true)
+            is_told = one.lower_bound <= one.distance - MARGIN - off + ROUNDING
             lagging = lagging_truths(self._world, message.header.stamp.to_sec(),
                                      message.cloud_stamp.to_sec(), one.link,
                                      TOLD_LAG if is_told else JOINT_LAG)
