@@ -29,15 +29,15 @@ MovingRobot panda(const std::filesystem::path& data) {
 // @param swing   [rad] amplitude of the joints
 // @param middle  [rad] about which they swing, by joint
 MovingRobot demo_arm(const std::string& name, double swing, const std::vector<double>& middle) {
-  RobotDescription robot = test::demo_robot();
+  const std::vector<LinkDescription> links = test::demo_robot().links;
+  RobotDescription robot;
+  robot.name = "demo_arm";
   std::vector<std::size_t> moving;
-  std::vector<LinkDescription> links;
-  for (std::size_t i = 0; i < robot.links.size(); ++i) {
-    if (robot.links[i].name == "base_link" || robot.links[i].name == "stand_link") continue;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    if (links[i].name == "base_link" || links[i].name == "stand_link") continue;
     moving.push_back(i);
-    links.push_back(robot.links[i]);
+    robot.links.push_back(links[i]);
   }
-  robot.links = links;
   return {name, robot, [=](std::size_t number) {
             constexpr double kRate = 1.5;  // [rad/s]
             std::vector<Poses> poses((kPosesPerPart - 1) * kStepsPerPose);
