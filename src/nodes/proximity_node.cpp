@@ -4,8 +4,8 @@
 #include "ist_proximity/ros/proximity_server.h"
 
 int main(int argc, char** argv) {
-  // With an arena for each busy thread, what one has freed does not serve the others: memory goes
-  // up and down by several megabytes under load. `scripts/soak` shows it.
+  // The allocator gives each busy thread an arena of its own, up to eight for each processor; what
+  // a thread has freed serves others only in the same arena.
 #ifdef M_ARENA_MAX
   mallopt(M_ARENA_MAX, 2);
 #endif
