@@ -151,7 +151,7 @@ class BadModelTest(pt.NodeTest):
     def check_soon_ended(self, node):
         begin = time.time()
         self.assertEqual(node.stop(), 0)
-        self.assertLess(time.time() - begin, 3.0)
+        self.assertLess(time.time() - begin, 15.0)  # after which roslaunch sends SIGTERM
 
     def test_large_mesh_is_told_and_does_not_hold_up_the_end(self):
         """While a mesh is read or packed, the status names it and its link; SIGINT ends the node."""

@@ -67,18 +67,16 @@ class FaultsLoadTest(faults.FaultTest):
         _, reaction = self.react(
             node, last, ProximityArray.STALE_CLOUD, timeout=self.cloud_timeout
         )
-        # Clouds keep coming: the reason is not that they do not.
-        begin = len(node.messages)
         message = node.wait_for_status(ProximityArray.STALE_CLOUD, "too long for its timeout")
         self.assertIn("noise filter", message.status_text)
+        # From here on such clouds keep coming: the reason is not that they do not.
+        begin = node.messages.index(message)
         node.wait_for(lambda m: len(node.messages) > begin + 100, "answers")
-        # A busy machine may deliver such a cloud later than its timeout now and then.
         texts = [other.status_text for other in node.messages[begin:]]
         # A reason follows in every message, also while such a cloud has just begun to be read.
         for text in texts:
             self.assertFalse(text.endswith("(~cloud_timeout)"), text)
-        blamed = sum("driver stopped" in text for text in texts)
-        self.assertLess(blamed, 0.2 * len(texts), texts[-1])
+            self.assertNotIn("driver stopped", text)
         self.sensor.halt()
         self.sensor.extra = NEIGHBORS
         since = time.monotonic()

@@ -56,7 +56,7 @@ class Robot:
     def __init__(self, namespace, q, points):
         rospy.set_param(namespace + "/robot_description", ARM)
         self.points, self.answer = points, None
-        self.world = pt.World(namespace, None)
+        self.world = pt.World(namespace, None, has_cloud=False)
         self.world.start_joints(q, rate=50)
         self.stop = self.world.stop
         self.clouds = {
@@ -82,7 +82,10 @@ class Robot:
             answers.append(self.answer)
             return self.answer and answers[-1].status == ProximityArray.OK
 
-        pt.wait_until(is_ok, "OK")
+        try:
+            pt.wait_until(is_ok, "OK")
+        except AssertionError as error:
+            raise AssertionError("%s: %s" % (error, answers[-1] and answers[-1].status_text))
         return answers[-1]
 
 

@@ -323,20 +323,20 @@ class MemoryTest(pt.NodeTest):
         self.node = pt.ProximityNode(self.namespace, parameters, SLIDING_BALL)
         is_seen = lambda m: m.links and self.ball(m).unseen_distance > 0.1  # noqa: E731
         self.node.wait_for(is_seen, "seen space about the ball")
-        begin = len(self.node.messages)
-        self.node.wait_until(lambda: len(self.node.messages) > begin + 1000, "1000 messages")
-        known = [m for m in self.node.messages[begin:] if self.ball(m).state != LinkProximity.UNKNOWN]
         compared = 0
-        for fresh, late in ((m, l) for m in known if m.header.stamp in stated for l in known):
-            t, t_late = fresh.header.stamp.to_sec(), late.header.stamp.to_sec()
-            if late.header.stamp in stated or not 0.0 < t - t_late < 0.1:
-                continue
-            if not place(t) / place(t_late) > 1.0 or (t - 0.3) // 0.6 != (t - 0.6) // 0.6:
-                continue  # only on the way out, and not where it has just turned
-            compared += 1
-            way = 1.1 * self.ball(fresh).unseen_distance + 0.02 + t - t_late
-            self.assertLess(self.ball(late).unseen_distance, way)
-        self.assertGreater(compared, 20)
+        while compared <= 20:  # a busy machine answers fewer of the stamps
+            begin = len(self.node.messages)
+            self.node.wait_until(lambda: len(self.node.messages) > begin + 500, "500 messages")
+            known = [m for m in self.node.messages[begin:] if self.ball(m).state != LinkProximity.UNKNOWN]
+            for fresh, late in ((m, l) for m in known if m.header.stamp in stated for l in known):
+                t, t_late = fresh.header.stamp.to_sec(), late.header.stamp.to_sec()
+                if late.header.stamp in stated or not 0.0 < t - t_late < 0.1:
+                    continue
+                if not place(t) / place(t_late) > 1.0 or (t - 0.3) // 0.6 != (t - 0.6) // 0.6:
+                    continue  # only on the way out, and not where it has just turned
+                compared += 1
+                way = 1.1 * self.ball(fresh).unseen_distance + 0.02 + t - t_late
+                self.assertLess(self.ball(late).unseen_distance, way)
 
     # The memory is in a frame in which the robot drives. No cloud comes while it does.
     def test_unknown_space_stands_still_while_the_robot_drives(self):

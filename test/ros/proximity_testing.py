@@ -168,7 +168,7 @@ class Repeater:
 class World:
     """The surroundings of a node: moving links in its /tf, a static camera, and a cloud."""
 
-    def __init__(self, namespace, X_BC=np.eye(4)):
+    def __init__(self, namespace, X_BC=np.eye(4), has_cloud=True):
         self.namespace = namespace
         self.poses = {}  # child frame: (parent, X or a function of the time in seconds)
         self.points = np.zeros((0, 3))  # in the camera's frame
@@ -178,7 +178,9 @@ class World:
         self._tf_static = rospy.Publisher(
             namespace + "/tf_static", TFMessage, queue_size=10, latch=True
         )
-        self.cloud_publisher = rospy.Publisher(namespace + "/cloud", PointCloud2, queue_size=10)
+        self.cloud_publisher = None
+        if has_cloud:
+            self.cloud_publisher = rospy.Publisher(namespace + "/cloud", PointCloud2, queue_size=10)
         if X_BC is not None:
             self.state_camera(X_BC)
         self._repeaters = []
@@ -239,7 +241,8 @@ class World:
             repeater.stop()
         self._repeaters = []
         for publisher in (self._tf, self._tf_static, self.cloud_publisher):
-            publisher.unregister()
+            if publisher:
+                publisher.unregister()
 
 
 class NodeTest(unittest.TestCase):
