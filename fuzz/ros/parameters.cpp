@@ -25,7 +25,7 @@ using XmlRpc::XmlRpcValue;
 
 constexpr int kDeepest = 3;
 
-// Names that the node reads, some of them misspelt.
+// Names that the node reads, and some that it does not.
 std::string name(ByteReader* in) {
   static const char* const kNames[] = {"query",        "margin",        "tolerance",
                                        "deadline",     "repulsion",     "influence_distance",
@@ -55,8 +55,10 @@ std::string word(ByteReader* in) {
                                        "/a",
                                        "",
                                        "sensor_msgs/PointCloud2",
+                                       "sensor_msgs/Image",
                                        "sensor_msgs/LaserScan",
-                                       "octomap_msgs/Octomap"};
+                                       "octomap_msgs/Octomap",
+                                       "world"};
   const std::size_t known = sizeof kWords / sizeof kWords[0];
   const std::size_t k = in->below(known + 3);
   return k < known ? kWords[k] : in->text(40);

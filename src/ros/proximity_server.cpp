@@ -1,4 +1,4 @@
-// This part of ProximityServer runs the cycle and publishes its results.
+// This part of ProximityServer puts the node together, runs the cycle and publishes its results.
 
 #include <ros/console.h>
 #include <sensor_msgs/PointCloud2.h>

@@ -135,5 +135,21 @@ TEST(ParameterText, IsTheConfiguration) {
   EXPECT_EQ(found, parameter_text());
 }
 
+// A live row elsewhere would show its changes and never have an effect.
+TEST(Parameters, LiveOnesAreInWhatTheCyclesTake) {
+  ServerConfig config;
+  const LiveConfig* const live = &config;
+  const std::set<std::string> groups = {"query", "repulsion", "speed_scale",
+                                        "speed_scale/separation"};
+  for (const Parameter& row : live_parameters(&config)) {
+    const void* const value = row.is_bool() ? std::get<bool*>(row.value)
+                                            : static_cast<void*>(std::get<double*>(row.value));
+    EXPECT_GE(value, static_cast<const void*>(live)) << row.name;
+    EXPECT_LT(value, static_cast<const void*>(live + 1)) << row.name;
+    EXPECT_EQ(groups.count(row.name.substr(0, row.name.rfind('/'))), 1u)
+        << "LiveParameters has no group of ~" << row.name;
+  }
+}
+
 }  // namespace
 }  // namespace ist

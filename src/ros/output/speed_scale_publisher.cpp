@@ -187,6 +187,7 @@ std::string SpeedScalePublisher::summary() const {
   constexpr const char* kRules[] = {"not known", "stop", "slow", "free", "separation"};
   std::string text = format_text("%.2f, ", answer_.scale);
   text += kRules[static_cast<std::size_t>(answer_.rule)];
+  // The monitored links come first there, so that it names a link of either answer.
   if (answer_.link >= 0) text += ", " + self_links_.links[static_cast<std::size_t>(answer_.link)];
   return text;
 }

@@ -17,9 +17,9 @@
 namespace ist {
 
 /// Parameters that may change while the node runs: the live rows of the table. They change on the
-/// parameter server, which is read again once a second, or through dynamic_reconfigure, in one
-/// group for each dictionary (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query
-/// ...`). Distances of single links have no group.
+/// parameter server, which is read again once a second, or through dynamic_reconfigure, in
+/// groups_ (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query ...`). Distances of
+/// single links have no group.
 ///
 /// Every value stays in use until a valid one replaces it, whatever happens to the parameter
 /// server: no answer, a master that restarts, names that are deleted, values that are wrong.

@@ -18,7 +18,8 @@ std::vector<Parameter> node_parameters(ServerConfig* config);
 /// The rows of it that may change while the node runs.
 std::vector<Parameter> live_parameters(ServerConfig* config);
 
-/// The table of a source, which depends on its type. The first row is the type.
+/// The table of a source, which depends on its type. The first row is the type, or without ~sources
+/// the timeout.
 /// @param at  "sources/NAME/", or empty: the parameters beside ~sources
 std::vector<Parameter> source_parameters(const std::string& at, SourceConfig* source);
 

@@ -77,7 +77,7 @@ struct TrajectoryConfig {
   std::string cancel_topic;     ///< of an action; empty: nothing is cancelled
 };
 
-/// Parameters that may change while the node runs.
+/// What the cycles take anew: the live parameters, and max_distance, which is read at the start.
 struct LiveConfig {
   LiveConfig() { query.deadline = kDefaultDeadline; }
 

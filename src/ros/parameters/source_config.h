@@ -16,12 +16,13 @@
 
 namespace ist {
 
-enum class SourceType { kCloud, kDepthImage, kScan, kMap, kWorld };
+enum class SourceType { kCloud, kDepthImage, kScan, kMap, kWorld };  // kWorld is the last one
 
 /// The ROS message type of a source, as rostopic writes it; a known world's type in ~sources is
 /// "world".
 const char* message_type(SourceType type);
-/// The word for one message of a source: "cloud", "image", "scan", "map" or "world".
+/// The word for one message of a source: "cloud", "image", "scan", "map" or "world"; no two types
+/// have the same.
 const char* noun(SourceType type);
 
 /// What a source remembers (~memory, ~sources/NAME/memory).

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string>
@@ -17,6 +19,8 @@ constexpr const char* kMessages[] = {"sensor_msgs/PointCloud2", "sensor_msgs/Ima
                                      "sensor_msgs/LaserScan", "octomap_msgs/Octomap",
                                      "ist_proximity/WorldObjects"};
 constexpr const char* kNouns[] = {"cloud", "image", "scan", "map", "world"};
+constexpr std::size_t kTypes = static_cast<std::size_t>(SourceType::kWorld) + 1;
+static_assert(std::size(kMessages) == kTypes && std::size(kNouns) == kTypes);
 
 /// The paddings by link, and the largest, which is that of Ingest.
 void read_paddings(ParameterReader* reader, const std::string& at, SourceConfig* source) {

@@ -27,7 +27,7 @@ std::string doubt_of_self_filter(const SourceReport& source) {
            " are on the robot and filtered out: check the sensor's transform, the URDF and "
            "self_filter_padding";
   }
-  // A laser scanner may never see the robot, so this concerns clouds only.
+  // A laser scanner may never see the robot, so this concerns cameras only.
   if (counts.on_robot == 0 && (source.noun == "cloud" || source.noun == "image")) {
     return "no point of the " + source.noun +
            " is on the robot: if the sensor sees the robot, its transform or "
