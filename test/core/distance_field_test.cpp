@@ -218,6 +218,26 @@ TEST(FieldContact, TheMinimumOfSeveralElementsIsAsExactAsAsked) {
   EXPECT_GT(contacts, 100);
 }
 
+// The depth in a link is that in one of its elements: the surface of another is no way out.
+TEST(FieldContact, ASmallElementInALargeOneMakesNothingLessDeep) {
+  const LinkGeometry link = {
+      GeometryElement{test::box({0.4, 0.4, 0.4}), Eigen::Isometry3d::Identity(), "large"},
+      GeometryElement{test::box({0.1, 0.1, 0.1}), Eigen::Isometry3d::Identity(), "small"}};
+  const auto model = test::with_fields(test::model_of({link}, 0.02));
+  const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  test::Rng rng(2);
+  for (int round = 0; round < 100; ++round) {
+    std::vector<Eigen::Vector3d> points = {Eigen::Vector3d(0.12, 0.0, 0.0)};
+    for (int k = 0; k < 20; ++k) points.push_back(test::random_vector(&rng, 0.06));
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    ProximityQuery query(model, {});
+    LinkProximity result;
+    ASSERT_TRUE(query.run_link(0, X_FL, {&cloud}, &result));
+    test::expect_truth(result, test::truth_of(link, X_FL, points, cloud), query.config(), X_FL);
+    if (HasFailure()) return;
+  }
+}
+
 // What is asked for a pose that is not finite is not known, with a field and without.
 TEST(FieldContact, APoseThatIsNotFiniteIsUnknown) {
   const std::vector<LinkGeometry> links = {test::one(test::box({0.1, 0.1, 0.1})),

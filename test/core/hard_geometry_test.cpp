@@ -181,10 +181,27 @@ Point random_point(test::Rng* rng, const SphereLink& link) {
              (test::uniform(rng, 0, 1) < 0.5 ? distance : sphere.radius + 0.1 * distance);
 }
 
+// A sphere of the tree is one that was given, in float: its inner sphere lies in that one, and its
+// cover sphere holds it.
+void expect_rounded(const InnerSphereTree& tree, const InnerSphere& given) {
+  bool is_found = false;
+  for (const SphereLeaf& leaf : tree.leaves()) {
+    for (int k = 0; k < leaf.count && !is_found; ++k) {
+      const Point center(leaf.x[k], leaf.y[k], leaf.z[k]);
+      const double moved = (center - given.center).norm();
+      is_found = static_cast<double>(leaf.inner_radius[k]) <= given.radius - moved &&
+                 static_cast<double>(leaf.cover_radius[k]) >= given.cover_radius + moved &&
+                 moved <= 1e-6 * given.center.norm();
+    }
+  }
+  EXPECT_TRUE(is_found) << given.center.transpose() << ", radius " << given.radius;
+}
+
 void expect_tree(const SphereLink& link, test::Rng* rng, int points) {
   SphereLink covered = link;
   for (InnerSphere& sphere : covered.spheres) sphere.cover_radius += 0.1 * sphere.radius;
   const InnerSphereTree tree(covered.packing());
+  for (const InnerSphere& sphere : covered.spheres) expect_rounded(tree, sphere);
   for (int i = 0; i < points; ++i) {
     const Point p = random_point(rng, link);
     const double rounding = 4e-6 * (link.extent() + p.norm());

@@ -221,5 +221,26 @@ TEST(HullDistance, IsALowerBoundAndTightForConvexMeshes) {
   EXPECT_GT(tight, test::scaled(30));
 }
 
+TEST(HullDistance, OfSpheresIsThatOfTheirSurfaces) {
+  test::Rng rng(33);
+  const auto sphere = [&] {
+    ConvexPart part;
+    part.kind = ConvexPart::Kind::kSphere;
+    part.a = test::random_vector(&rng, 1.0);
+    part.radius = test::power_of_ten(&rng, -4.0, 0.0);
+    return part;
+  };
+  for (int i = 0; i < 1000; ++i) {
+    const ConvexPart a = sphere(), b = sphere();
+    const Eigen::Isometry3d X_BA = random_pose(&rng, i);
+    const double truth = (X_BA * a.a - b.a).norm() - a.radius - b.radius;
+    HullSupport support;
+    const double bound =
+        hull_distance(HullCoreset({&a, 1}), HullCoreset({&b, 1}), X_BA, 1e-9, &support).lower_bound;
+    ASSERT_LE(bound, std::max(truth, 0.0) + 1e-14);
+    ASSERT_GE(bound, truth - 1e-8);
+  }
+}
+
 }  // namespace
 }  // namespace ist

@@ -273,9 +273,10 @@ TEST(WorldQuery, AWorldWithoutPosesIsNotKnown) {
     EXPECT_EQ(answer_at(&query, known).state, LinkState::kClear);
     EXPECT_EQ(answer_at(&query, known).lower_bound, 1.0);
   }
+  PosedWorld unplaced = world;
+  unplaced.X_FB.clear();
+  EXPECT_EQ(answer_at(&query, unplaced).state, LinkState::kUnknown);
   world.X_FB[0].translation().x() = std::nan("");
-  EXPECT_EQ(answer_at(&query, world).state, LinkState::kUnknown);
-  world.X_FB.clear();
   EXPECT_EQ(answer_at(&query, world).state, LinkState::kUnknown);
 }
 

@@ -4,12 +4,43 @@
 #include <stdexcept>
 #include <string>
 
+#include "internal/bvh/padded_box.h"
+
 namespace ist::test {
+
+namespace {
+
+/// Adds the tiles below a node.
+/// @param outer  [m] the box that its parent has of it
+void add_tiles(const PointBvh& bvh, std::int32_t node, const PaddedBox& outer,
+               std::vector<PointTile>* tiles) {
+  const auto require_inside = [](bool is_inside, const char* what) {
+    if (!is_inside) throw std::logic_error(std::string(what) + " lies outside its box");
+  };
+  const BoxNode& boxes = bvh.nodes()[static_cast<std::size_t>(node)];
+  for (int k = 0; k < boxes.count; ++k) {
+    const PaddedBox box = box_in(boxes, k);
+    require_inside((box.min >= outer.min).all() && (box.max <= outer.max).all(), "a box");
+    if (boxes.child[k] >= 0) {
+      add_tiles(bvh, boxes.child[k], box, tiles);
+      continue;
+    }
+    const auto i = static_cast<std::size_t>(~boxes.child[k]);
+    PointTile scratch;
+    const PointTile& tile = tiles->at(i) = bvh.tile(i, &scratch);
+    for (int j = 0; j < tile.count; ++j) {
+      const Eigen::Array4f p(tile.x[j], tile.y[j], tile.z[j], 0.0F);
+      require_inside((p >= box.min).all() && (p <= box.max).all(), "a point");
+    }
+  }
+}
+
+}  // namespace
 
 std::vector<PointTile> tiles_of(const PointBvh& bvh) {
   std::vector<PointTile> tiles(bvh.tile_count());
-  PointTile scratch;
-  for (std::size_t i = 0; i < tiles.size(); ++i) tiles[i] = bvh.tile(i, &scratch);
+  if (bvh.root() < 0) return tiles;
+  add_tiles(bvh, bvh.root(), bounds_of(bvh.nodes()[static_cast<std::size_t>(bvh.root())]), &tiles);
   return tiles;
 }
 

@@ -11,6 +11,7 @@
 namespace ist::test {
 
 /// All tiles of an index, whether a query has looked at them or not.
+/// @throws std::logic_error where a point or a box lies outside its box: a search would prune it
 std::vector<PointTile> tiles_of(const PointBvh& bvh);
 std::vector<PointTile> tiles_of(const PointIndex& index);
 
