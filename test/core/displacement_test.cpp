@@ -92,7 +92,7 @@ TEST(Displacement, IsThatOfTheFarthestCorner) {
 }
 
 TEST(Displacement, IsNotKnownOfPosesThatAreNotFinite) {
-  const DisplacementBound bound(Eigen::AlignedBox3d(Eigen::Vector3d::Zero()));
+  const DisplacementBound bound{Eigen::AlignedBox3d(Eigen::Vector3d::Zero())};
   const Eigen::Isometry3d X_FA = Eigen::Isometry3d::Identity();
   for (const double wrong :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
@@ -155,7 +155,7 @@ TEST(LinkBound, IsKeptNearHolesOnlyWhileEveryPlaceIsOutside) {
 
 // A front without some part would leave obstacles out.
 TEST(SearchFront, IsNotKeptWhenThereWasNoPlaceForAPart) {
-  const DisplacementBound displacement(Eigen::AlignedBox3d(Eigen::Vector3d::Zero()));
+  const DisplacementBound displacement{Eigen::AlignedBox3d(Eigen::Vector3d::Zero())};
   const Eigen::Isometry3d X_OL = Eigen::Isometry3d::Identity();
   SearchFront front;
   front.begin(7, X_OL, displacement, 0.0F);

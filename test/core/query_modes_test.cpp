@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <vector>
 
+#include "ist_proximity/proximity/proximity_query.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
