@@ -77,7 +77,7 @@ struct TrajectoryConfig {
   std::string cancel_topic;     ///< of an action; empty: nothing is cancelled
 };
 
-/// What the cycles take anew: the live parameters, and max_distance, which is read at the start.
+/// The parameters that each cycle takes anew: live ones, and max_distance, read at the start only.
 struct LiveConfig {
   LiveConfig() { query.deadline = kDefaultDeadline; }
 
