@@ -226,8 +226,8 @@ class TrajectoryTest(pt.NodeTest):
 
     # Obstacles stand still from now on, and are where they are now, not where tf saw them last.
     def test_objects_in_late_frames_are_nearer(self):
-        late, speed, begin = 0.3, 0.3, rospy.Time.now().to_sec()
-        middle = lambda t: max(3.0 - speed * (t - begin), 0.9)  # noqa: E731: of the box, along x
+        late, speed, begin = 0.3, 0.3, np.inf
+        middle = lambda t: np.clip(2.2 - speed * (t - begin), 0.9, 2.2)  # noqa: E731: of the box, along x
 
         def send():
             stamp = rospy.Time.now() - rospy.Duration(late)
@@ -239,10 +239,13 @@ class TrajectoryTest(pt.NodeTest):
         cell = {"type": "world", "objects": {"box": box}}
         self.points = np.array([[0.0, 3.0, 0.5]])
         self.start(sources={"cloud": {"topic": "cloud"}, "cell": cell}, max_distance=5.0)
+        begin = rospy.Time.now().to_sec()
+        pt.wait_until(lambda: rospy.Time.now().to_sec() > begin + 2 * late, "the box, as seen, to move")
         self.send()
         self.wait(lambda m: m.state == m.NONE, "its end", 0)
         known = [m for m in self.heard if m.state in (m.CLEAR, m.CONTACT)]
         self.assertGreater(len(known), 20)
+        self.assertEqual({m.state for m in known}, {TrajectoryClearance.CLEAR, TrajectoryClearance.CONTACT})
         for message in known:
             stamp = message.header.stamp.to_sec()
             room = middle(stamp) - 0.05 - pt.BALL_RADIUS - FAR  # at the end

@@ -12,10 +12,11 @@ namespace ist {
 StatedPoseSource::StatedPoseSource(std::shared_ptr<const Kinematics> kinematics,
                                    const TransformBuffer& buffer, const std::string& fixed_frame,
                                    const std::vector<std::string>& links, double timeout,
-                                   double mimic_tolerance)
+                                   double mimic_tolerance, Stamp stamp)
     : KinematicPoseSource(std::move(kinematics), buffer, fixed_frame, links,
                           std::vector<bool>(links.size(), true), timeout),
       mimic_tolerance_(mimic_tolerance),
+      stamp_(stamp),
       q_(kinematics_->joints().size(), std::nan("")) {}
 
 std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration) {
@@ -125,7 +126,7 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
     }
   }
   check_mimics(now, &joint_problems);
-  poses->stamp = instant;
+  poses->stamp = stamp_ == Stamp::kNow ? now : instant;
   place(joint_problems, poses);
 }
 

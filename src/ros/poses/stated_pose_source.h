@@ -12,15 +12,21 @@ namespace ist {
 
 /// Link poses of a configuration that a request states; the robot need not be in it. Joints that
 /// the request leaves out, planar and floating joints, and the pose of the root link in the fixed
-/// frame come from tf as they are now: at the newest instant at which it knows them all, which is
-/// that of the poses. A mimic joint of a stated joint follows it, unless it is elsewhere now than
-/// its formula says: then it is not known.
+/// frame come from tf as they are now: at the newest instant at which it knows them all. A mimic
+/// joint of a stated joint follows it, unless it is elsewhere now than its formula says: then it is
+/// not known.
 class StatedPoseSource : public KinematicPoseSource {
  public:
+  /// The stamp of the poses, at which obstacles in frames that move are looked up.
+  enum class Stamp {
+    kOfRobot,  ///< the instant at which tf knows all that is not stated
+    kNow,      ///< the present: what is not stated is taken to stand still since that instant
+  };
+
   /// @param mimic_tolerance  [rad, m] by which a mimic joint may be elsewhere now than led
   StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const TransformBuffer& buffer,
                    const std::string& fixed_frame, const std::vector<std::string>& links,
-                   double timeout, double mimic_tolerance);
+                   double timeout, double mimic_tolerance, Stamp stamp);
 
   /// @param wanted  by link: false leaves it unknown, without a problem
   void set_wanted(const std::vector<bool>& wanted) { wanted_ = wanted; }
@@ -47,6 +53,7 @@ class StatedPoseSource : public KinematicPoseSource {
   void check_mimics(const ros::Time& now, std::vector<PoseProblem>* problems);
 
   const double mimic_tolerance_;
+  const Stamp stamp_;
   std::vector<double> q_;  ///< by joint; NaN where it is left out
   bool root_known_ = false;
   bool mimics_follow_ = true;

@@ -39,7 +39,10 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 }  // namespace
 
 QueryService::QueryService(const AddOnContext& node, std::function<void()> meanwhile)
-    : live_(node.live), meanwhile_(std::move(meanwhile)), stated_(node), self_(node.config) {
+    : live_(node.live),
+      meanwhile_(std::move(meanwhile)),
+      stated_(node, StatedPoseSource::Stamp::kOfRobot),
+      self_(node.config) {
   ros::NodeHandle private_nh = node.private_nh;
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);

@@ -20,7 +20,8 @@ std::string StatedCycle::take_model() {
   }
   auto poses = std::make_unique<StatedPoseSource>(
       model_->kinematics, node_.buffer, fixed_frame_of(*model_, node_.config),
-      link_names(*model_->robot), node_.config.pose_timeout, node_.config.trajectory.tolerance);
+      link_names(*model_->robot), node_.config.pose_timeout, node_.config.trajectory.tolerance,
+      stamp_);
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(
       model_, node_.config, std::move(poses), CloudSelection::Reader::kOther,

@@ -19,7 +19,8 @@ namespace ist {
 /// thread.
 class StatedCycle {
  public:
-  explicit StatedCycle(const AddOnContext& node) : node_(node) {}
+  StatedCycle(const AddOnContext& node, StatedPoseSource::Stamp stamp)
+      : node_(node), stamp_(stamp) {}
 
   /// Takes the newest model.
   /// @returns empty, or why there is none
@@ -44,6 +45,7 @@ class StatedCycle {
 
  private:
   const AddOnContext node_;
+  const StatedPoseSource::Stamp stamp_;
 
   std::shared_ptr<const ModelState> model_;
   StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle

@@ -34,7 +34,9 @@ std::unique_ptr<AddOn> make_trajectory(const AddOnContext& node) {
 }
 
 TrajectoryWatch::TrajectoryWatch(const AddOnContext& node)
-    : node_(node), config_(with_fixed_links(node.config)), stated_(node) {
+    : node_(node),
+      config_(with_fixed_links(node.config)),
+      stated_(node, StatedPoseSource::Stamp::kNow) {
   publisher_ = node_.private_nh.advertise<Message>("trajectory_clearance", 10);
   markers_ = node_.private_nh.advertise<visualization_msgs::MarkerArray>("trajectory_markers", 1);
   if (!config_.trajectory.cancel_topic.empty()) {
