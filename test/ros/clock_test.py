@@ -208,9 +208,11 @@ class ClockTest(pt.NodeTest):
         commands.stop()
         clock.jump(-50.0)
         pt.wait_until(lambda: any("gone back" in s.status_text for s in one.states), "the jump")
-        begin = len(one.given)
-        pt.wait_until(lambda: len(one.given) > begin + 20, "velocities of 0")
+        begin = len(one.given), len(one.scales)
+        pt.wait_until(lambda: len(one.given) > begin[0] + 20, "velocities of 0")
         self.assertFalse(any(np.any(m.velocity) for m in one.given))
+        pt.wait_until(lambda: len(one.scales) > begin[1] + 20, "speed scales")
+        self.assertFalse(any(one.scales[begin[1] :]))
         self.assertEqual(one.stop(), 0)
 
 

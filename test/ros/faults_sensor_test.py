@@ -121,6 +121,8 @@ class FaultsSensorTest(faults.FaultTest):
             with self.subTest(sensors):
                 self.sensor.change = lambda message, n=sensors: by_turns(message, n)
                 node.wait_for_status(STALE, "by turns in the frames")
+                for message in node.next_messages(100):  # for as long as they come
+                    self.assertIn("by turns in the frames", message.status_text)
                 self.sensor.change = None
                 node.wait_for_status(ProximityArray.OK)
 

@@ -82,7 +82,9 @@ class SelfFilterTest(pt.NodeTest):
                 self.frame = "one"
                 state(wrong)
                 move_box(in_view)
-                self.node.wait_for(is_right, "a corrected pose")
+                self.node.wait_for(
+                    lambda m: is_right(m) and m.sources[0].points_on_robot > 0, "a corrected pose"
+                )
                 move_box(away)
                 self.node.wait_for(
                     lambda m: is_right(m) and m.sources[0].points_on_robot == 0, "the robot out of view"
