@@ -42,10 +42,10 @@ struct Trial {
 
 enum Part { kQuery, kRepulsion, kPenetration, kMessage, kReport, kSerialize, kCycle, kParts };
 
-Trial demo_trial(std::size_t steps) {
+Trial demo_trial(const std::string& cache, std::size_t steps) {
   const RobotDescription demo = test::demo_robot();
   const Kinematics kinematics(demo);
-  Trial arm{"demo arm", test::demo_model(), {}, synthetic_frame(), {}};
+  Trial arm{"demo arm", packed(demo, cache, kMaxError), {}, synthetic_frame(), {}};
   for (const LinkDescription& link : demo.links) arm.geometry.push_back(link.geometry);
   std::vector<double> q(kinematics.joints().size(), 0.0);
   for (std::size_t k = 0; k < steps; ++k) {
@@ -57,7 +57,7 @@ Trial demo_trial(std::size_t steps) {
 }
 
 std::vector<Trial> trials(const std::string& cache, bool quick) {
-  std::vector<Trial> all = {demo_trial(quick ? 200 : 2000)};
+  std::vector<Trial> all = {demo_trial(cache, quick ? 200 : 2000)};
   const auto data = test::data_dir();
   if (!data) return all;
   const DataSet panda = kinect_data(*data, cache);
