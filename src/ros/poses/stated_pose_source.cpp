@@ -113,13 +113,17 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
     joint_problems[j].text =
         look_up_latest(bodies[joints[j].parent], bodies[joints[j].child], &joints_.X_PC[j]);
   }
-  problem = ist::look_up(buffer_, fixed_frame_, bodies[0], instant, &X_FR_);
+  // At the present each is where tf knew it last, as objects on a base that drives are.
+  const bool is_common = stamp_ == Stamp::kOfRobot;
+  if (is_common) problem = ist::look_up(buffer_, fixed_frame_, bodies[0], instant, &X_FR_);
   if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
   root_known_ = true;
   for (const std::size_t j : left_out) {
     std::string& why = joint_problems[j].text;
     const std::string &to = bodies[joints[j].parent], &from = bodies[joints[j].child];
-    if (why.empty()) why = ist::look_up(buffer_, to, from, instant, &joints_.X_PC[j]);
+    if (why.empty() && is_common) {
+      why = ist::look_up(buffer_, to, from, instant, &joints_.X_PC[j]);
+    }
     joints_.known[j] = why.empty();
     if (!why.empty()) {
       why.insert(0, "joint '" + joints[j].name + "' is not stated, and not known now: ");

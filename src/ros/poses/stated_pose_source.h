@@ -12,15 +12,14 @@ namespace ist {
 
 /// Link poses of a configuration that a request states; the robot need not be in it. Joints that
 /// the request leaves out, planar and floating joints, and the pose of the root link in the fixed
-/// frame come from tf as they are now: at the newest instant at which it knows them all. A mimic
-/// joint of a stated joint follows it, unless it is elsewhere now than its formula says: then it is
-/// not known.
+/// frame come from tf as they are now, see Stamp. A mimic joint of a stated joint follows it,
+/// unless it is elsewhere now than its formula says: then it is not known.
 class StatedPoseSource : public KinematicPoseSource {
  public:
   /// The stamp of the poses, at which obstacles in frames that move are looked up.
   enum class Stamp {
     kOfRobot,  ///< the instant at which tf knows all that is not stated
-    kNow,      ///< the present: what is not stated is taken to stand still since that instant
+    kNow,      ///< the present: each thing that is not stated is where tf knew it last
   };
 
   /// @param mimic_tolerance  [rad, m] by which a mimic joint may be elsewhere now than led
