@@ -143,6 +143,17 @@ class SpeedScaleTest(pt.NodeTest):
         self.assertIn("driver stopped", self.scales[-1].text)
         self.wait_for_minimum(node, np.nan)
 
+    def test_separation_beyond_what_is_measured(self):
+        self.world.stand()
+        self.world.start_tf()
+        self.world.start_clouds()
+        self.start(pt.urdf(), speed_scale={"separation": {"enabled": True}})
+        pt.wait_until(lambda: self.scales[-1].rule == SpeedScaleState.SEPARATION, "the separation to decide")
+        state = self.scales[-1]
+        self.assertAlmostEqual(state.bound, 1.0, places=6)  # ~max_distance
+        self.assertTrue(0.0 < state.scale < 1.0, state)
+        self.assertIn("raise ~max_distance", state.text)
+
     def test_link_that_is_not_there(self):
         """Its distance was meant for another link: the scale is 0, and everything else goes on."""
         self.start_bench()

@@ -81,6 +81,9 @@ class TrajectoryTest(pt.NodeTest):
     def follow(self):
         return {} if self.astray is None else {"follow": -1.5 * self.slide() - 0.5 + self.astray}
 
+    def turned(self):
+        return {} if self.turn is None else {"turn": self.turn}
+
     def start(self, urdf=ARM, **parameters):
         super().start(urdf, pose_source="joint_states", self_filter=False, **parameters)
         self.heard = self.node.collect("trajectory_clearance", TrajectoryClearance)
@@ -90,7 +93,7 @@ class TrajectoryTest(pt.NodeTest):
         )
         self.sender = rospy.Publisher(self.node.name + "/trajectory", JointTrajectory, queue_size=1)
         self.world.start_joints(
-            lambda: {"turn": self.turn, "slide": self.slide(), **self.follow()}, velocities=self.speeds
+            lambda: {**self.turned(), "slide": self.slide(), **self.follow()}, velocities=self.speeds
         )
         self.world.start_points(lambda: self.points)
         self.node.wait_for_status(0)
@@ -254,6 +257,39 @@ class TrajectoryTest(pt.NodeTest):
             else:
                 touch = max(DURATION * (1 + room / FAR), stamp - message.start.to_sec())
                 self.assertLessEqual((message.contact - message.start).to_sec(), touch + 0.01)
+
+    def test_an_object_on_a_base_that_drives(self):
+        begin, speed = rospy.Time.now(), 0.3
+        X_BT = pt.transform((POINT + 0.05, 0, 0.5))
+
+        def drive():
+            now = rospy.Time.now()
+            X_OB = pt.transform((speed * (now - begin).to_sec(), 0, 0))
+            self.world.publish_transforms(
+                [
+                    pt.transform_message("odom", "base", X_OB, now),
+                    pt.transform_message("base", "tray", X_BT, now),
+                ]
+            )
+
+        self.world.repeat(50, drive)
+        # A joint that the trajectory leaves out, and that is told seldom.
+        self.world.start_joints({"turn": self.turn}, rate=4)
+        self.turn, self.speeds = None, [0.0]
+        box = {"shape": "box", "size": [0.1, 0.1, 0.1], "frame_id": "tray"}
+        cell = {"type": "world", "objects": {"box": box}}
+        self.points = np.array([[0.0, 3.0, 0.5]])
+        self.start(sources={"cloud": {"topic": "cloud"}, "cell": cell}, fixed_frame="odom")
+        self.send()
+        self.wait(lambda m: m.state == m.NONE, "its end", 0)
+        told = [m for m in self.heard if m.state == m.CONTACT]
+        self.assertGreater(len(told), 20)
+        for message in told:
+            self.assertEqual(message.header.frame_id, "odom")
+            # The tray is as late as tf is; a base at another instant than it would be 0.1 m off.
+            if (message.header.stamp - message.start).to_sec() < TOUCH - 0.3:
+                contact = (message.contact - message.start).to_sec()
+                self.assertTrue(TOUCH - 0.2 < contact <= TOUCH, (contact, TOUCH))
 
     def test_obstacles_come_while_the_robot_waits_and_brakes(self):
         speed, wait, deceleration = 0.1, 3.0, 0.4

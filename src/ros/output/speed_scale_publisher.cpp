@@ -17,6 +17,7 @@ namespace {
 
 using ist_proximity::ProximityArray;
 using ist_proximity::SpeedScaleState;
+using LinkMessage = ist_proximity::LinkProximity;
 
 constexpr char kUnknownReach[] =
     "stop: how far a link goes until it stands is not known: the URDF has to limit the velocity of "
@@ -65,7 +66,8 @@ std::string speed_scale_text(const SpeedScaleAnswer& answer, const ProximityArra
     case SpeedRule::kSlow:
       return "slow: " + near + held + ", it is free at " + metres(answer.free_distance);
     case SpeedRule::kSeparation:
-      return "separation: " + near + held + ", and obstacles may be there before it stands";
+      return "separation: " + near + held + ", and obstacles may be there before it stands" +
+             (link.state == LinkMessage::CLEAR ? "; to go faster, raise ~max_distance" : "");
     default:
       return "free: " + near;
   }
