@@ -20,7 +20,8 @@ bool MovedRobot::begin(const JointMotion& motion, const JointPoses& still) {
     }
   }
   motion_ = motion;
-  place_mimics(kinematics(), &motion_);
+  kinematics().place_mimics(&motion_.from);
+  kinematics().place_mimics(&motion_.to);
   still_ = &still;
   return true;
 }
@@ -28,10 +29,9 @@ bool MovedRobot::begin(const JointMotion& motion, const JointPoses& still) {
 MotionBound MovedRobot::bound_deviation(std::size_t body, const Eigen::Vector3d& center,
                                         double radius, const std::vector<double>& deviation) const {
   JointMotion off{std::vector<double>(deviation.size(), 0.0), deviation, 1.0};
-  for (std::size_t j = 0; j < deviation.size(); ++j) {
+  for (const std::size_t j : kinematics().mimics()) {
     const Kinematics::Joint& joint = kinematics().joints()[j];
-    if (joint.source == j) continue;
-    off.to[j] = std::max(off.to[j], std::abs(joint.multiplier) * deviation[joint.source]);
+    off.to[j] = std::max(off.to[j], std::abs(joint.mimic.multiplier) * off.to[joint.leader]);
   }
   return {kinematics(), off, body, center, radius};
 }

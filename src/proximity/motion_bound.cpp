@@ -12,16 +12,6 @@ double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion) {
   return std::isnan(change) ? 0.0 : std::abs(change) / motion.duration;
 }
 
-void place_mimics(const Kinematics& kinematics, JointMotion* motion) {
-  for (std::size_t j = 0; j < motion->from.size(); ++j) {
-    const Kinematics::Joint& joint = kinematics.joints()[j];
-    if (joint.source == j) continue;
-    for (std::vector<double>* q : {&motion->from, &motion->to}) {
-      if (std::isnan((*q)[j])) (*q)[j] = joint.multiplier * (*q)[joint.source] + joint.offset;
-    }
-  }
-}
-
 MotionBound::MotionBound(const Kinematics& kinematics, const JointMotion& motion, std::size_t body,
                          const Eigen::Vector3d& center, double radius, std::size_t ancestor)
     : body_(body), center_(center), radius_(radius) {

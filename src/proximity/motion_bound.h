@@ -21,7 +21,7 @@ namespace ist {
 /// is farther from where it was than a h, with a the speed at the start.
 class MotionBound {
  public:
-  /// @param motion          after place_mimics()
+  /// @param motion          after Kinematics::place_mimics() of both its ends
   /// @param center, radius  [m] the body's bounding sphere, in the body's frame
   /// @param ancestor  a body that this one hangs on: the motion is that in its frame
   MotionBound(const Kinematics& kinematics, const JointMotion& motion, std::size_t body,
@@ -47,9 +47,6 @@ class MotionBound {
 /// The time [s] that a distance [m] takes, a little less to allow for rounding; +inf for a speed of
 /// 0.
 double time_within(double distance, double speed);
-
-/// Sets the positions of mimic joints that follow, which the functions here read.
-void place_mimics(const Kinematics& kinematics, JointMotion* motion);
 
 /// How fast [rad/s, m/s] the motion moves a joint, mimic joints included; 0: not at all.
 double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion);

@@ -54,16 +54,16 @@ void brake_joints(const Kinematics& kinematics, Span<const double> velocities,
   for (std::size_t j = 0; j < count; ++j) {
     const Kinematics::Joint& joint = kinematics.joints()[j];
     if (joint.has_unstated_pose()) continue;
-    const bool is_stated = !std::isnan(velocities[j]);
-    if (joint.type == JointType::kFixed) {
-      (*joints)[j] = {0.0, 0.0, 0.0};
-    } else if (joint.source == j || is_stated) {
+    (*joints)[j] = {0.0, 0.0, 0.0};
+    if (joint.type == JointType::kFixed) continue;
+    if (joint.leader == j || !std::isnan(velocities[j])) {
       (*joints)[j] = braking(velocities[j], decelerations[j]);
     }
-    if (joint.source == j) continue;
-    const StoppingReach led = scaled(braking(velocities[joint.source], decelerations[joint.source]),
-                                     std::abs(joint.multiplier));
-    (*joints)[j] = is_stated ? larger((*joints)[j], led) : led;
+  }
+  for (const std::size_t j : kinematics.mimics()) {
+    const Kinematics::Joint& joint = kinematics.joints()[j];
+    (*joints)[j] =
+        larger((*joints)[j], scaled((*joints)[joint.leader], std::abs(joint.mimic.multiplier)));
   }
 }
 

@@ -181,19 +181,28 @@ void TimeOfImpact::run(const StraightPieces& pieces, double from, const JointPos
   const auto all_unknown = [&] { results->assign(count, LinkClearance()); };
   impl.carried.take(worlds, impl.moved.forward().kinematics());
   const ImpactObstacles obstacles{clouds, impl.carried.worlds()};
+  const auto run_piece = [&](const JointMotion& motion, double begin,
+                             const std::vector<double>& deviation) {
+    const bool is_known = deviation.size() == motion.from.size() && are_bounded(deviation);
+    if (!is_known || !impl.moved.begin(motion, still)) return false;
+    impl.bound_carried();
+    Impl::Piece piece(&impl, begin, from, deviation, X_FR, obstacles, obstacle_speed, obstacle_age);
+    for (Advance& advance : advances) {
+      if (!advance.is_over) piece.run(&advance);
+    }
+    return true;
+  };
   for (std::size_t k = 0; k + 1 < pieces.times.size(); ++k) {
     if (pieces.times[k + 1] <= from) continue;
     const JointMotion motion{pieces.positions[k], pieces.positions[k + 1],
                              pieces.times[k + 1] - pieces.times[k]};
-    const bool is_known = pieces.deviations[k].size() == pieces.positions[k].size() &&
-                          are_bounded(pieces.deviations[k]);
-    if (!is_known || !impl.moved.begin(motion, still)) return all_unknown();
-    impl.bound_carried();
-    Impl::Piece piece(&impl, pieces.times[k], from, pieces.deviations[k], X_FR, obstacles,
-                      obstacle_speed, obstacle_age);
-    for (Advance& advance : advances) {
-      if (!advance.is_over) piece.run(&advance);
-    }
+    if (!run_piece(motion, pieces.times[k], pieces.deviations[k])) return all_unknown();
+  }
+  if (pieces.times.size() == 1 || pieces.times.back() <= from) {  // the robot stays at its end
+    const std::vector<double>& end = pieces.positions.back();
+    const std::vector<double> none(end.size(), 0.0);
+    if (!run_piece({end, end, 1.0}, std::max(from, pieces.times.back()), none))
+      return all_unknown();
   }
   for (Advance& advance : advances) {
     if (!advance.is_over) advance.found->contact_time = kInfinity;

@@ -54,6 +54,7 @@ Kinematics::Joint make_joint(const JointDescription& description, std::size_t pa
   joint.source = index;
   joint.multiplier = 1.0;
   joint.offset = 0.0;
+  joint.leader = index;
   return joint;
 }
 
@@ -114,6 +115,9 @@ void Kinematics::resolve_mimics(const RobotDescription& description) {
       joint.source = source.source;
       joint.multiplier = mimic.multiplier * source.multiplier;
       joint.offset = mimic.multiplier * source.offset + mimic.offset;
+      joint.leader = chain[k - 1];
+      joint.mimic = mimic;
+      mimics_.push_back(chain[k - 2]);
       is_resolved[chain[k - 2]] = true;
     }
   }
@@ -163,6 +167,26 @@ Eigen::Isometry3d Kinematics::joint_pose(std::size_t joint, double q) const {
   return X_PC;
 }
 
+/// Where a joint is stated, or else where the nearest joint of its chain of mimics that is stated
+/// puts it; NaN: none is.
+double Kinematics::led_position(const std::vector<double>& q, std::size_t joint) const {
+  double factor = 1.0, offset = 0.0;
+  while (std::isnan(q[joint]) && joints_[joint].leader != joint) {
+    offset += factor * joints_[joint].mimic.offset;
+    factor *= joints_[joint].mimic.multiplier;
+    joint = joints_[joint].leader;
+  }
+  return factor * q[joint] + offset;
+}
+
+void Kinematics::place_mimics(std::vector<double>* q) const {
+  for (const std::size_t j : mimics_) {
+    const Mimic& mimic = joints_[j].mimic;
+    double& own = (*q)[j];
+    if (std::isnan(own)) own = mimic.multiplier * (*q)[joints_[j].leader] + mimic.offset;
+  }
+}
+
 void Kinematics::place_joints(const std::vector<double>& q, JointPoses* poses) const {
   poses->X_PC.resize(joints_.size(), Eigen::Isometry3d::Identity());
   poses->known.assign(joints_.size(), false);
@@ -170,10 +194,7 @@ void Kinematics::place_joints(const std::vector<double>& q, JointPoses* poses) c
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const Joint& joint = joints_[j];
     if (joint.has_unstated_pose()) continue;
-    const bool fixed = joint.type == JointType::kFixed;
-    const bool follows = joint.source != j && std::isnan(q[j]);
-    const double own = follows ? joint.multiplier * q[joint.source] + joint.offset : q[j];
-    const double position = fixed ? 0.0 : own;
+    const double position = joint.type == JointType::kFixed ? 0.0 : led_position(q, j);
     if (!std::isfinite(position)) continue;
     if (joint.type == JointType::kPrismatic && std::abs(position) > kMaxLength) continue;
     poses->X_PC[j] = joint_pose(j, position);

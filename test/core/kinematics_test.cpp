@@ -88,14 +88,23 @@ TEST(Kinematics, chainsOfMimics) {
   EXPECT_TRUE(X("l4").linear().isApprox(turned_c_d, 1e-14));
   for (const char* name : {"a", "b", "d"}) EXPECT_FALSE(k.joints()[*k.find_joint(name)].is_free());
   EXPECT_TRUE(k.joints()[*k.find_joint("c")].is_free());
-  // A stated position counts; it needs no joint to follow, and moves none.
+  // A stated position counts: for the joint, which needs none to follow, and for those that mimic
+  // it.
   placed = place(k, {{"c", c}, {"b", 0.2}});
+  const Eigen::Matrix3d turned_by_b =
+      Eigen::AngleAxisd(-2 * 0.2 + 0.1, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   EXPECT_EQ(X("l2").translation().z(), 0.2);
-  EXPECT_TRUE(X("l1").linear().isApprox(turned_a, 1e-14));
+  EXPECT_TRUE(X("l1").linear().isApprox(turned_by_b, 1e-14));
   EXPECT_TRUE(X("l4").linear().isApprox(turned_c_d, 1e-14));
   placed = place(k, {{"b", 0.2}});
   EXPECT_TRUE(placed.bodies.known[*k.find_body("l2")]);
+  EXPECT_TRUE(X("l1").linear().isApprox(turned_by_b, 1e-14));
   EXPECT_FALSE(placed.bodies.known[*k.find_body("l3")]);
+  std::vector<double> q = positions(k, {{"b", 0.2}});
+  k.place_mimics(&q);
+  EXPECT_NEAR(q[*k.find_joint("a")], -2 * 0.2 + 0.1, 1e-15);
+  EXPECT_TRUE(std::isnan(q[*k.find_joint("d")]));
+  ASSERT_EQ(k.mimics().size(), 3u);
 }
 
 TEST(Kinematics, bodiesBelowUnknownJointsAreUnknown) {

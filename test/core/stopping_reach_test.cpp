@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "ist_proximity/control/constraint_rows.h"
@@ -149,6 +150,28 @@ TEST(StoppingReach, ofAnArmByHand) {
   EXPECT_NEAR(reach.distance, 0.5 * 2.0 + 1.0 * 1.0, 1e-8);  // 0.5 rad, 1 rad
   EXPECT_NEAR(reach.time, 2.0, 1e-12);
   EXPECT_EQ(stopping_reach(kinematics, stops, 0, box, X_FB).distance, 0.0);
+}
+
+// The third joint mimics the second one, which mimics the first, and may be stated as well.
+TEST(StoppingReach, ofAChainOfMimics) {
+  RobotDescription description;
+  description.root_link = "base";
+  description.link_order = description.links_without_geometry = {"base", "a", "b", "c"};
+  for (const auto& [name, child] : {std::pair("first", "a"), {"second", "b"}, {"third", "c"}}) {
+    description.joints.push_back(
+        test::joint(name, JointType::kRevolute, "base", child, {0, 0, 0}, {0, 0, 1}));
+  }
+  description.joints[1].mimic = Mimic{"first", -2.0, 0.0};
+  description.joints[2].mimic = Mimic{"second", 3.0, 0.0};
+  const Kinematics kinematics(description);
+  std::vector<StoppingReach> stops;
+  brake_joints(kinematics, {1.0, kNaN, kNaN}, {0.5, 0.0, 0.0}, &stops);
+  EXPECT_EQ(stops[1].speed, 2.0);
+  EXPECT_EQ(stops[2].speed, 6.0);
+  EXPECT_EQ(stops[2].distance, 6.0);  // the first goes 1 rad
+  brake_joints(kinematics, {1.0, 5.0, kNaN}, {0.5, 1.0, 0.0}, &stops);
+  EXPECT_EQ(stops[2].speed, 15.0);
+  EXPECT_EQ(stops[2].distance, 37.5);
 }
 
 // What is not known is not known to stand.

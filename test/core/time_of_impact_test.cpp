@@ -299,7 +299,8 @@ TEST(MotionBound, noPointMovesFarther) {
     if (i % 2 == 0) center = X_FB[body].inverse() * X_FB[arm.bodies[0]].translation();
     const double radius = i % 3 == 0 ? 0.0 : 0.1;
     JointMotion placed = motion.joints;
-    place_mimics(*arm.kinematics, &placed);
+    arm.kinematics->place_mimics(&placed.from);
+    arm.kinematics->place_mimics(&placed.to);
     const MotionBound bound(*arm.kinematics, placed, body, center, radius);
     const double distance = test::uniform(&rng, 0.01, 1.0);
     const double time =

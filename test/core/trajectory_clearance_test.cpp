@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "ist_proximity/facade/robot.h"
@@ -337,6 +338,26 @@ constexpr const char* kSlide = R"(<robot name="one"><link name="base"/>
     <link name="ball"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
     <joint name="slide" type="prismatic"><parent link="base"/><child link="ball"/>
       <axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>)";
+
+// One point is a trajectory, and what is left of another one at its end.
+TEST(TrajectoryClearance, theEndIsMeasured) {
+  const Robot robot(kSlide);
+  JointPoses still;
+  robot.kinematics()->place_joints({0.0}, &still);
+  TimeOfImpact impacts(robot.model(), robot.kinematics(), QueryConfig());
+  for (const double x : {0.35, 0.25}) {
+    const CloudSnapshot cloud = test::make_snapshot({Eigen::Vector3d(x, 0.0, 0.0)});
+    const StraightPieces point{{0.0}, {{0.2}}, {}}, way{{0.0, 1.0}, {{0.0}, {0.2}}, {{0.0}}};
+    for (const auto& [pieces, from] : {std::pair(point, 0.0), std::pair(way, 1.0)}) {
+      std::vector<LinkClearance> found;
+      impacts.run(pieces, from, still, Eigen::Isometry3d::Identity(), {true}, {&cloud}, {}, 0.0,
+                  0.0, &found);
+      EXPECT_EQ(found[0].contact_time, x < 0.3 ? from : kInf);
+      EXPECT_LE(found[0].lower_bound, x - 0.3);
+      EXPECT_GE(found[0].lower_bound, x - 0.3 - 0.0126);
+    }
+  }
+}
 
 TEST(TrajectoryClearance, gradientsOfTheDistanceWhereItIsLeast) {
   const Robot robot(kSlide);

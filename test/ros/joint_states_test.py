@@ -316,6 +316,33 @@ class JointStatesTest(pt.NodeTest):
         self.assertGreater(max(beyond), 0.002)  # the joint that is late matters
         self.assertLess(np.median(below), 0.05)
 
+    def test_a_joint_that_has_just_come(self):
+        """Two of its positions do not tell how it speeds up, so its limit counts until the third."""
+        begin, sent = [], []
+        node = self.start(max_distance=3.0, self_filter=False)
+        q = lambda t: 0.1 + 0.2 * min(t - begin[0], 1.5) ** 2  # noqa: E731: at 0.4 m/s^2
+
+        def send_slide():
+            stamp = rospy.Time.now()
+            begin.append(stamp.to_sec())
+            self.publisher.publish(joint_state({"slide": q(stamp.to_sec())}, stamp))
+            sent.append(stamp)
+
+        self.world.start_joints({"turn": 0.0})
+        self.world.start_points(np.array([[0.9, 0.0, 0.5]]))
+        node.wait_for(lambda m: m.sources and m.sources[0].status == ProximityArray.OK, "a cloud")
+        self.world.repeat(4, send_slide)
+        node.wait_until(lambda: len(sent) > 5, "some positions")
+        after_two = 0
+        for message in node.messages:
+            one = pt.link(message, "ball_link")
+            if one is None or one.state == LinkProximity.UNKNOWN:
+                continue
+            truth = 0.8 - q(message.header.stamp.to_sec())
+            self.assertLessEqual(one.lower_bound, truth + 5e-4)
+            after_two += sent[1] < message.header.stamp < sent[2]
+        self.assertGreater(after_two, 5)
+
     def test_burst(self):
         """Joint states that come all at once are answered one by one, in their order."""
         node = self.start(pose_timeout=5.0)

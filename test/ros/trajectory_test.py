@@ -16,7 +16,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ist_proximity.msg import TrajectoryClearance
-from ist_proximity.srv import IgnoreLinks, RemoveZone, SetZone, SetZoneRequest
+from ist_proximity.srv import DetachObject, IgnoreLinks, RemoveZone, SetZone, SetZoneRequest
 
 DURATION = 4.0  # [s]
 FAR = 0.8  # [m] where the slide goes to
@@ -81,8 +81,10 @@ class TrajectoryTest(pt.NodeTest):
     def follow(self):
         return {} if self.astray is None else {"follow": -1.5 * self.slide() - 0.5 + self.astray}
 
-    def turned(self):
-        return {} if self.turn is None else {"turn": self.turn}
+    def positions(self):
+        """Of all joints that are told often."""
+        turned = {} if self.turn is None else {"turn": self.turn}
+        return {**turned, "slide": self.slide(), **self.follow()}
 
     def start(self, urdf=ARM, **parameters):
         super().start(urdf, pose_source="joint_states", self_filter=False, **parameters)
@@ -92,9 +94,7 @@ class TrajectoryTest(pt.NodeTest):
             cancel, GoalID, lambda _: self.cancelled.append(rospy.Time.now())
         )
         self.sender = rospy.Publisher(self.node.name + "/trajectory", JointTrajectory, queue_size=1)
-        self.world.start_joints(
-            lambda: {**self.turned(), "slide": self.slide(), **self.follow()}, velocities=self.speeds
-        )
+        self.world.start_joints(lambda: self.positions(), velocities=self.speeds)
         self.world.start_points(lambda: self.points)
         self.node.wait_for_status(0)
         pt.wait_until(lambda: self.sender.get_num_connections() > 0, "the node to listen")
@@ -179,7 +179,7 @@ class TrajectoryTest(pt.NodeTest):
 
     def test_zones_and_ignored_links_count_as_in_the_cycle(self):
         self.points = np.array([[POINT, 0.0, 0.5], [0.0, 0.9, 0.5]])
-        self.start(trajectory={"tolerance": 1.0})
+        self.start()
         ignore = self.node.service("ignore_links", IgnoreLinks)
         remove = self.node.service("remove_zone", RemoveZone)
         set_zone = self.node.service("set_zone", SetZone)
@@ -220,7 +220,7 @@ class TrajectoryTest(pt.NodeTest):
         self.start(
             ARM.replace("</robot>", post),
             sources={"held": {"type": "world", "objects": {"tool": tool}}},
-            trajectory={"tolerance": 1.0},
+
         )
         self.send()
         told = self.wait(lambda m: m.state == m.CONTACT, "the tool at the post", 0)
@@ -291,12 +291,31 @@ class TrajectoryTest(pt.NodeTest):
                 contact = (message.contact - message.start).to_sec()
                 self.assertTrue(TOUCH - 0.2 < contact <= TOUCH, (contact, TOUCH))
 
+    def test_a_base_whose_poses_are_stamped_ahead(self):
+        begin, speed, ahead = rospy.Time.now(), -0.3, 0.5
+        X_BT = pt.transform((POINT + 0.05, 0, 0.5))
+
+        def drive():
+            stamp = rospy.Time.now() + rospy.Duration(ahead)
+            X_OB = pt.transform((speed * (stamp - begin).to_sec(), 0, 0))
+            frames = [("odom", "base", X_OB), ("base", "tray", X_BT)]
+            self.world.publish_transforms([pt.transform_message(*frame, stamp) for frame in frames])
+
+        self.world.repeat(50, drive)
+        box = {"shape": "box", "size": [0.1, 0.1, 0.1], "frame_id": "tray"}
+        cell = {"type": "world", "objects": {"box": box}}
+        self.points = np.array([[0.0, 3.0, 0.5]])
+        self.start(sources={"cloud": {"topic": "cloud"}, "cell": cell}, fixed_frame="odom")
+        self.send()
+        told = self.wait(lambda m: m.state == m.CONTACT, "the tray", 0)
+        self.check_touch(told)
+
     def test_obstacles_come_while_the_robot_waits_and_brakes(self):
         speed, wait, deceleration = 0.1, 3.0, 0.4
         self.start(
             query={"max_distance": 3.0},
             joint_deceleration=deceleration,
-            trajectory={"obstacle_speed": speed, "tolerance": 1.0},
+            trajectory={"obstacle_speed": speed},
         )
         start = rospy.Time.now() + rospy.Duration(wait)
         self.sender.publish(trajectory([(0.0, 0.0), (DURATION, FAR)], start))
@@ -308,8 +327,85 @@ class TrajectoryTest(pt.NodeTest):
         self.assertGreater(contact, room / (speed + FAR / DURATION) - 0.15)
         self.assertAlmostEqual((told.contact - told.brake).to_sec(), 0.25, places=3)
 
+    def test_what_touches_before_it_begins(self):
+        self.points = np.array([[0.5 * pt.BALL_RADIUS, 0.0, 0.5]])
+        self.start(joint_deceleration=0.4)
+        for rows in ([(0.0, 0.0), (DURATION, FAR)], [(0.0, 0.0)]):  # one that stays has one point
+            begin = len(self.heard)
+            self.start_time = rospy.Time.now() + rospy.Duration(3.0 + len(rows))
+            self.sender.publish(trajectory(rows, self.start_time))
+            is_it = lambda m: m.start == self.start_time and m.state == m.CONTACT  # noqa: E731
+            told = self.wait(is_it, "the contact", begin)
+            self.assertEqual(told.first.link, "ball_link")
+            self.assertEqual((told.contact, told.brake), (told.header.stamp, told.header.stamp))
+            self.assertEqual(told.time_to_contact, 0.0)
+
+    def test_a_trajectory_that_replaces_another_one_later(self):
+        self.start()
+        self.send()
+        self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
+        later = self.start_time + rospy.Duration(2.0)  # the slide is at 0.4 m then
+        self.sender.publish(trajectory([(0.0, 0.4), (1.0, 0.4)], later))
+        self.wait(lambda m: m.start == later or m.state == m.UNKNOWN, "the other one")
+        self.wait(lambda m: m.state == m.CLEAR, "its clear way")
+        for message in self.heard:
+            if message.start == later and message.state == message.CLEAR:
+                self.assertGreaterEqual(message.header.stamp, later)
+        self.assertTrue(any("until this trajectory begins" in m.text for m in self.heard))
+
+    def test_an_object_is_attached_meanwhile(self):
+        self.points = np.array([[-1.5, 0.0, 0.6]])
+        self.start(max_distance=3.0)
+        self.send()
+        self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
+        attach = lambda: self.node.attach("column", (0, 0, 0.9), [0.02])  # noqa: E731
+        detach = self.node.service("detach_object", DetachObject)
+        for change in (attach, lambda: detach("tool")):
+            change()
+            begin = len(self.heard)
+            pt.wait_until(lambda: len(self.heard) > begin + 5, "answers")  # noqa: B023
+            for message in self.heard[begin:]:
+                self.assertIn(message.state, (message.CONTACT, message.UNKNOWN), message.text)
+                if message.state == message.CONTACT:
+                    self.assertEqual(message.first.link, "box_link")
+                    self.check_touch(message, (1.5 - 0.55) / (1.5 * FAR / DURATION))
+
+    def test_mimics_of_mimics_and_of_whole_turns(self):
+        # `far` mimics `near`, which mimics `lead`; `rack` mimics `wheel`, which turns without end.
+        ball = "<collision><geometry><sphere radius='0.1'/></geometry></collision>"
+        slide = "<axis xyz='1 0 0'/><limit lower='-3' upper='3' effort='1' velocity='1'/>"
+        urdf = "<robot name='arm'><link name='base'/>"
+        for name, y, mimic in (
+            ("lead", 1.0, ""), ("near", 0.5, "lead' multiplier='-1"), ("far", 0.0, "near' multiplier='-2"),
+            ("rack", -1.0, "wheel' multiplier='0.1"),
+        ):
+            mimic = mimic and "<mimic joint='%s'/>" % mimic
+            urdf += f"<link name='{name}_link'>{ball}</link><joint name='{name}' type='prismatic'>"
+            urdf += f"<parent link='base'/><child link='{name}_link'/><origin xyz='0 {y} 0.5'/>"
+            urdf += slide + mimic + "</joint>"
+        urdf += "<link name='disc'/><joint name='wheel' type='continuous'><parent link='base'/>"
+        urdf += "<child link='disc'/><axis xyz='0 0 1'/></joint></robot>"
+        turns = 2 * np.pi
+        self.positions = lambda: {"lead": -0.15 * self.slide(), "near": 0.15 * self.slide(), "wheel": turns}
+        self.speeds = []
+        self.points = np.array([[-0.3, 0.0, 0.5], [0.9, -1.0, 0.5]])
+        self.start(urdf)
+        # The far ball goes to -0.24 m, and touches the point at -0.2 m.
+        self.start_time = rospy.Time.now() + rospy.Duration(0.3)
+        self.sender.publish(trajectory([(0, 0.0), (DURATION, 0.15 * FAR)], self.start_time, ["near"]))
+        told = self.wait(lambda m: m.state == m.CONTACT, "the far ball", 0)
+        self.assertEqual(told.first.link, "far_link")
+        self.check_touch(told, DURATION * 0.2 / 0.24)
+        # The rack is at 0.63 m and goes on to 0.83 m: it touches at 0.8 m.
+        self.start_time = rospy.Time.now() + rospy.Duration(0.3)
+        self.positions = lambda: {"wheel": turns + 2.0 / FAR * self.slide(), "lead": 0.0, "near": 0.0}
+        self.sender.publish(trajectory([(0, 0.0), (DURATION, 2.0)], self.start_time, ["wheel"]))
+        told = self.wait(lambda m: m.start == self.start_time and m.state == m.CONTACT, "the rack")
+        self.assertEqual(told.first.link, "rack_link")
+        self.check_touch(told, DURATION * (8.0 - turns) / 2.0)
+
     def test_the_ghost_of_the_first_contact(self):
-        self.start(trajectory={"tolerance": 1.0})
+        self.start()
         drawn = self.node.collect("trajectory_markers", MarkerArray)
         self.send()
         told = self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
@@ -387,7 +483,7 @@ class TrajectoryTest(pt.NodeTest):
         self.wait(lambda m: m.state == m.CLEAR, "one that follows")
 
     def test_without_clouds_nothing_is_known(self):
-        self.start(trajectory={"tolerance": 1.0})
+        self.start()
         self.send()
         self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
         self.points = np.full((5, 3), np.nan)
@@ -396,7 +492,7 @@ class TrajectoryTest(pt.NodeTest):
 
     def test_joints_begin_where_they_are(self):
         """A first point that is not at time 0 is reached from the present position."""
-        self.start(trajectory={"tolerance": 1.0})
+        self.start()
         self.sender.publish(trajectory([(DURATION, FAR)], rospy.Time()))
         told = self.wait(lambda m: m.state == m.CONTACT, "a contact", 0)
         self.check_touch(told)
@@ -431,7 +527,7 @@ class TrajectoryTest(pt.NodeTest):
 
     def test_goals_of_controllers_and_planners(self):
         """The bridge reads whatever definition a publisher sends."""
-        self.start(trajectory={"tolerance": 1.0})
+        self.start()
         bridge = subprocess.Popen(
             [
                 pt.find_program("ist_proximity", "trajectory_bridge"),

@@ -6,6 +6,7 @@ import os
 import tempfile
 import unittest
 
+import numpy as np
 import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
@@ -43,6 +44,20 @@ def scene_file():
     path = os.path.join(tempfile.mkdtemp(), "cell.scene")
     with open(path, "w") as file:
         file.write(SCENE)
+    return path
+
+
+def hill_file(edge=150):
+    """A mesh of some tens of thousands of triangles, which takes about a second to read."""
+    x, y = np.meshgrid(np.linspace(-1, 1, edge + 1), np.linspace(-1, 1, edge + 1), indexing="ij")
+    p = np.stack([x, y, 0.05 * np.sin(9 * x) * np.cos(7 * y)], -1)
+    a, b, c, d = p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]
+    triangles = np.concatenate([np.stack(t, -2).reshape(-1, 3, 3) for t in ((a, b, c), (a, c, d))])
+    records = np.zeros(len(triangles), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("end", "<u2")])
+    records["corners"] = triangles
+    path = os.path.join(tempfile.mkdtemp(), "hill.stl")
+    with open(path, "wb") as file:
+        file.write(b" " * 80 + np.uint32(len(triangles)).tobytes() + records.tobytes())
     return path
 
 
@@ -241,16 +256,20 @@ class WorldTest(unittest.TestCase):
         self.node.wait_for_status(
             ProximityArray.NO_CLOUD, "10001 objects; allowed are 10000"
         )
+        # They are missing until all objects are sent anew.
+        first = len(self.node.messages)
+        self.send(box("part", 0.0, 5.0))
+        pt.wait_until(lambda: len(self.node.messages) > first + 50, "messages")
+        self.assertEqual({m.status for m in self.node.messages[first:]}, {ProximityArray.NO_CLOUD})
         self.send(replace_all=True)
         self.is_at_table()
-        # What exceeds a limit is refused as a whole, also where it is to replace all objects: the
-        # part of before stays.
+        # What exceeds a limit is refused as a whole, also where it is to replace all objects.
         self.send(box("part", 0.0, 0.3))
         self.node.wait_for_distance(0.1, "the part")
         self.send(*[box("object %d" % i, 5.0) for i in range(10000)], replace_all=True)
         self.node.wait_for_status(ProximityArray.NO_CLOUD, "would hold 10001 objects")
-        self.send()
-        self.node.wait_for_distance(0.1, "the part of before")
+        self.send(box("part", 0.0, 0.25), replace_all=True)
+        self.node.wait_for_distance(0.05, "the part")
 
     def test_6_query_service(self):
         self.is_at_table()
@@ -275,6 +294,59 @@ class WorldTest(unittest.TestCase):
         self.node.wait_for_distance(0.1, "the stop")
         self.send(box("stop", 3.0, operation=WorldObject.MOVE))
         self.is_at_table()
+
+
+    def test_8_what_is_mended_counts_when_it_is_measured(self):
+        """Mended, it was not in the world before all that was sent with it had been read."""
+        broken = box("part", 0.0, 0.3)
+        broken.dimensions = [0.2, 0.2, 0.0]
+        self.send(broken)
+        self.node.wait_for_unknown(ProximityArray.NO_CLOUD, "'part'")
+        first = len(self.node.messages)
+        large = WorldObject(id="hill", shape=WorldObject.MESH, mesh="file://" + hill_file())
+        large.pose.orientation.w, large.pose.position.y = 1.0, 50.0
+        self.send(box("part", 0.0, 0.3), box("nobody", 0.0, operation=WorldObject.REMOVE), large)
+        self.node.wait_for_distance(0.1, "the part")
+        for message in self.node.messages[first:]:
+            one = pt.link(message, "ball_link")
+            self.assertTrue(one.state == LinkProximity.UNKNOWN or one.lower_bound < 0.1 + 1e-6, message)
+        self.assertTrue(any("has been read for" in m.status_text for m in self.node.messages[first:]))
+
+    def test_9_frames_that_are_none(self):
+        for frame in ("/", "(fixed frame)"):
+            self.send(box("part", 0.0, 0.3, frame=frame))
+            self.node.wait_for_unknown(ProximityArray.NO_CLOUD, "no frame of tf")
+            self.send(replace_all=True)
+            self.is_at_table()
+
+
+class FreshWorldTest(pt.NodeTest):
+    """A world with a timeout, whose sender repeats that it is there."""
+
+    BOX = None
+
+    def test_messages_keep_it_fresh(self):
+        parts = rospy.Publisher(self.namespace + "/parts", WorldObjects, queue_size=10)
+        self.world.stand()
+        self.world.start_tf()
+        node = self.start(sources={"parts": {"type": "world", "topic": "parts", "timeout": 1.0}})
+        pt.wait_until(lambda: parts.get_num_connections() > 0, "the node to listen")
+
+        def send(*objects):
+            message = WorldObjects(objects=objects)
+            message.header.stamp = rospy.Time.now()
+            parts.publish(message)
+
+        sender = self.world.repeat(5, send)
+        node.wait_for_status(ProximityArray.OK)
+        send(box("part", 0.0, 0.3))
+        node.wait_for_distance(0.1, "the part")
+        first = len(node.messages)
+        end = rospy.Time.now() + rospy.Duration(2.0)
+        node.wait_for(lambda m: m.header.stamp > end, "two seconds")
+        self.assertEqual({m.status for m in node.messages[first:]}, {ProximityArray.OK})
+        sender.paused = True
+        node.wait_for_unknown(ProximityArray.STALE_CLOUD, "allowed is 1.00 s")
 
 
 class OtherRobotTest(pt.NodeTest):
@@ -345,4 +417,4 @@ class OtherRobotTest(pt.NodeTest):
 
 
 if __name__ == "__main__":
-    pt.run("world_test", {"objects": WorldTest, "robot": OtherRobotTest})
+    pt.run("world_test", {"objects": WorldTest, "fresh": FreshWorldTest, "robot": OtherRobotTest})

@@ -55,6 +55,8 @@ class Kinematics {
     std::size_t source;      ///< joint whose position moves this one; itself unless it mimics
     double multiplier;       ///< factor of the source's position, over the whole chain of mimics
     double offset;           ///< [rad, m] added to that product
+    std::size_t leader;      ///< joint that its <mimic> names; itself unless it mimics
+    Mimic mimic;             ///< how it follows that one
 
     /// Whether it takes a position of its own.
     bool is_free() const;
@@ -73,13 +75,19 @@ class Kinematics {
   /// @returns the joint's index; empty when no joint has this name
   std::optional<std::size_t> find_joint(const std::string& name) const;
 
+  /// The mimic joints, every one after its leader.
+  const std::vector<std::size_t>& mimics() const { return mimics_; }
+  /// Places the mimic joints that are not stated where their leaders put them.
+  /// @param q  [rad, m] by joint; NaN where it is not stated, or not known afterwards
+  void place_mimics(std::vector<double>* q) const;
+
   /// X_PC of one joint at position q [rad, m] of its own; q is ignored where the joint is fixed.
   /// Not for planar and floating joints.
   Eigen::Isometry3d joint_pose(std::size_t joint, double q) const;
 
   /// Poses of all joints that positions determine.
-  /// @param q      by joint, NaN where not known; a mimic joint at NaN follows its source. With
-  ///               another size no joint is known
+  /// @param q      by joint, NaN where not known; a mimic joint at NaN follows the nearest joint of
+  ///               its chain that is not. With another size no joint is known
   /// @param poses  overwritten; planar and floating joints are not known
   void place_joints(const std::vector<double>& q, JointPoses* poses) const;
 
@@ -97,10 +105,12 @@ class Kinematics {
   void add_tree(const RobotDescription& description);
   void resolve_mimics(const RobotDescription& description);
   std::size_t followed_joint(const JointDescription& joint) const;
+  double led_position(const std::vector<double>& q, std::size_t joint) const;
 
   std::vector<std::string> bodies_;
   std::vector<Joint> joints_;
   std::unordered_map<std::string, std::size_t> body_of_name_, joint_of_name_;
+  std::vector<std::size_t> mimics_;
 };
 
 /// Linear velocity [m/s] over angular velocity [rad/s], per joint.

@@ -124,7 +124,7 @@ void SensorSource::receive(Measurement measurement) {
   take_target();
   const ros::Time stamp = measurement.header.stamp;
   std::string problem = check(measurement);
-  if (problem.empty() && !is_map_) problem = note_frame(measurement.header.frame_id);
+  if (problem.empty() && !is_map_) problem = note_frame(without_slash(measurement.header.frame_id));
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
   if (is_believed) tell_skew(ahead);
@@ -315,7 +315,7 @@ void SensorSource::begin_view(const std::string& frame) {
 /// @param is_shown  on ~filtered_cloud, which is not cropped at the region of interest
 void SensorSource::take_in(const Measurement& measurement, const Placement& placement,
                            bool is_shown, SourceSnapshot* snapshot) {
-  begin_view(measurement.header.frame_id);
+  begin_view(without_slash(measurement.header.frame_id));
   ingest_.set_region_of_interest(is_shown ? RegionOfInterest() : target_.region);
   PlacedZones zones;
   if (config_.has_zones()) zones = zones_.place(target_.fixed_frame, measurement.header.stamp);

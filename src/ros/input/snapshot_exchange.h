@@ -42,6 +42,8 @@ struct SourceSnapshot {
   /// belong to the world then.
   PosedWorld world;
   std::shared_ptr<const RobotSurfaces> surfaces;
+  std::string incomplete;       ///< what is missing in the world; empty: nothing is
+  bool has_messages = true;     ///< whether one has come, where the world has a topic
   std::vector<bool> is_placed;  ///< by frame of the world; its objects are left out where not
   std::string unplaced;         ///< why some of the world is left out; empty: none is
 };

@@ -16,6 +16,7 @@
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/world_file.h"
 #include "ros/common/frame_name.h"
+#include "ros/input/world_conversion.h"
 #include "ros/input/world_source.h"
 
 namespace ist {
@@ -168,8 +169,9 @@ void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objec
 }
 
 /// @param stated  by a message; may be empty
+/// @throws ModelError
 std::string WorldSource::frame_of(const std::string& stated) const {
-  return frame_or_fixed(stated.empty() ? config_.world.frame_id : stated);
+  return frame_or_fixed(object_frame(stated, config_.world.frame_id));
 }
 
 }  // namespace ist

@@ -9,7 +9,9 @@
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/world_file.h"
 #include "ros/common/eigen_conversion.h"
+#include "ros/common/frame_name.h"
 #include "ros/common/text.h"
+#include "ros/input/source.h"
 
 namespace ist {
 namespace {
@@ -105,6 +107,14 @@ GeometryElement to_element(const Message& message, const PackageFinder& find_pac
   return element;
 }
 
+std::string object_frame(const std::string& stated, const std::string& other) {
+  if (stated.empty()) return other;
+  if (without_slash(stated).empty() || stated == kFixedFrame) {
+    throw ModelError("header.frame_id is '" + stated + "', which is no frame of tf");
+  }
+  return stated;
+}
+
 Eigen::Isometry3d to_object_pose(const geometry_msgs::Pose& pose) {
   geometry_msgs::Transform transform;
   assign(to_vector(pose.position), &transform.translation);
@@ -119,7 +129,7 @@ WorldObject to_world_object(const Message& message, const WorldConfig& config,
                             const CancelRequest& cancelled) {
   WorldObject object;
   object.name = message.id;
-  object.frame = message.header.frame_id.empty() ? config.frame_id : message.header.frame_id;
+  object.frame = object_frame(message.header.frame_id, config.frame_id);
   object.X_BO = to_object_pose(message.pose);
   object.geometry = {to_element(message, environment_package_finder(), cancelled)};
   if (!(message.margin >= 0.0)) {

@@ -24,6 +24,11 @@ WorldObject to_world_object(const ist_proximity::WorldObject& message, const Wor
 GeometryElement to_element(const ist_proximity::WorldObject& message,
                            const PackageFinder& find_package, const CancelRequest& cancelled);
 
+/// The frame of an object.
+/// @param stated  by a message; empty: `other` is
+/// @throws ModelError where it is the name of no frame
+std::string object_frame(const std::string& stated, const std::string& other);
+
 /// Converts a pose.
 /// @throws ModelError
 Eigen::Isometry3d to_object_pose(const geometry_msgs::Pose& pose);

@@ -13,7 +13,7 @@ namespace ist {
 enum class WorldFaultKind {
   kScene,       ///< the scene that the sender mirrors is not known: until it is
   kConfigured,  ///< parameters and the file: for good, because they are never sent again
-  kMessage,     ///< the last message: until the next one
+  kMessage,     ///< a message that was refused whole: until all objects are replaced
   kOctomap,     ///< the octomap: until the next one
   kRobot,       ///< the other robot: until it is read
   kWork,        ///< the source's thread: until it succeeds

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -26,7 +27,7 @@ constexpr std::chrono::seconds kSilence(5);
 
 void WorldSource::receive(const ist_proximity::WorldObjects& message) {
   if (!running_) return;  // up to a thousand wait
-  has_received_ = true;
+  is_changed_ |= !std::exchange(has_received_, true);
   begin_work();
   is_mirror_ = message.mirror;
   guard(Kind::kMessage, [&] { apply(message); });
@@ -39,6 +40,7 @@ void WorldSource::receive(const ist_proximity::WorldObjects& message) {
 void WorldSource::note_receipt(const ros::Time& stamp) {
   const ros::Time now = ros::Time::now();
   stamp_ = stamp.isZero() ? now : std::min(stamp, now);
+  if (std::isfinite(config_.timeout)) is_changed_ = true;  // the snapshot is as old as this one
   update([&](SourceReport* report) {
     ++report->messages;
     report->newest = stamp_.toSec();
@@ -50,11 +52,12 @@ void WorldSource::apply(const ist_proximity::WorldObjects& message) {
   if (message.objects.size() > limit) {
     note_fault(fault_of(Kind::kMessage),
                "a message holds " + std::to_string(message.objects.size()) +
-                   " objects; allowed are " + std::to_string(limit) + ": it is not used");
+                   " objects; allowed are " + std::to_string(limit) +
+                   ": it is not used, send all objects anew (replace_all)");
     return show_faults();
   }
-  faults_.erase(fault_of(Kind::kMessage));
   if (!message.replace_all) return change_all(message.objects);
+  faults_.erase(fault_of(Kind::kMessage));
   replace_from_topic([&] { change_all(message.objects); });
 }
 
@@ -212,9 +215,10 @@ void WorldSource::use_octomap(const ist_proximity::WorldOctomap& message) {
   data.size = message.data.size();
   Octree tree;
   Eigen::Isometry3d X_BM = Eigen::Isometry3d::Identity();
-  std::string fault;
+  std::string fault, frame;
   if (data.size > 0) {
     try {
+      frame = frame_of(message.header.frame_id);
       X_BM = to_object_pose(message.origin);
       fault = read_octree(data, &tree, config_.map);
     } catch (const ModelError& error) {
@@ -230,7 +234,7 @@ void WorldSource::use_octomap(const ist_proximity::WorldOctomap& message) {
     index->build(tree.occupied);
   }
   octomap_ = std::move(index);
-  octomap_frame_ = frame_of(message.header.frame_id);
+  octomap_frame_ = frame;
   X_BM_ = X_BM;
   faults_.erase(fault_of(Kind::kOctomap));
   is_changed_ = true;

@@ -36,7 +36,8 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
                                                            robot_prefix_, [] {});
     }
     is_robot_read_ = false;
-    update([](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
+    faults_[fault_of(Kind::kRobot)] = "waiting for the other robot's URDF";
+    show_faults();
   }
   markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("world/" + config.name, 1, true);
   nh.setCallbackQueue(&queue_);
@@ -90,7 +91,7 @@ void WorldSource::note_fault(const WorldFaultKey& key, const std::string& fault)
   faults_[key] = fault;
 }
 
-/// The source is not OK while an object is missing.
+/// The source is not OK while an object is missing: at once, and until a snapshot holds it.
 void WorldSource::show_faults() {
   std::string text;
   if (!faults_.empty()) {
@@ -99,6 +100,9 @@ void WorldSource::show_faults() {
       text += "; and " + std::to_string(faults_.size() - 1) + " more objects cannot be used";
     }
   }
+  if (text == incomplete_) return;
+  incomplete_ = text;
+  is_changed_ = true;
   update([&](SourceReport* report) { report->incomplete = text; });
 }
 
@@ -114,7 +118,6 @@ void WorldSource::take_target() {
 }
 
 void WorldSource::publish() {
-  is_changed_ = false;
   SourceSnapshot& snapshot = exchange_.writable();
   snapshot = SourceSnapshot();
   snapshot.world.world = builder_.world();
@@ -131,7 +134,10 @@ void WorldSource::publish() {
   snapshot.cloud.stamp = stamp_.toSec();
   snapshot.cloud.counts.received = snapshot.cloud.counts.used =
       static_cast<std::uint32_t>(builder_.size() + (octomap_ ? octomap_->size() : 0));
+  snapshot.incomplete = incomplete_;
+  snapshot.has_messages = has_received_ || !config_.world.has_topic;
   exchange_.publish();
+  is_changed_ = false;
   publish_markers();
 }
 

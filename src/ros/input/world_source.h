@@ -77,6 +77,7 @@ class WorldSource : public Source {
   // Used by the source's thread alone.
   WorldBuilder builder_;
   WorldFaults faults_;
+  std::string incomplete_;  ///< what they say of the world
   WorldFaultLog fault_log_;
   std::shared_ptr<const RobotSurfaces> surfaces_;  ///< of target_.model
   bool is_robot_read_ = true, is_changed_ = false;

@@ -37,7 +37,7 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
       const std::size_t source = tree[body - 1].source;
       if (!tree[source].is_free()) continue;
       moved_by_[i].push_back(body - 1);
-      matters_[body - 1] = matters_[source] = true;
+      for (std::size_t at = body - 1; !matters_[at]; at = tree[at].leader) matters_[at] = true;
     }
   }
 }
@@ -143,7 +143,8 @@ bool JointPoseSource::must_hold(const ros::Time& instant) const {
 }
 
 /// A joint that comes less often than others keeps its position until its next sample: it moves on
-/// as fast as it did of late, or as it says, and speeds up as it did of late. With a constant
+/// as fast as it did of late, or as it says, and speeds up as it did of late; until that is known,
+/// as fast as its limit. With a constant
 /// acceleration a, samples T apart and a lag up to T, that is all: its mean rate is a (T + lag) / 2
 /// more than that between its last two samples, and theirs is a T more than the one before.
 void JointPoseSource::find_lags(const ros::Time& instant) {
@@ -156,15 +157,13 @@ void JointPoseSource::find_lags(const ros::Time& instant) {
     const double lag = seconds_between(position.stamp, instant);
     if (!(lag > 0.0)) continue;
     const double change = std::abs(position.rate - position.rate_before);
-    double speed = std::fmax(std::abs(position.rate), std::abs(position.velocity));
-    if (!std::isnan(change)) speed += change;
-    // What is faster than the joint's limit is a jump of what is stated.
+    double speed = std::fmax(std::abs(position.rate), std::abs(position.velocity)) + change;
+    // What is faster than the joint's limit is a jump of what is stated; NaN: it is not known yet.
     speed = std::fmin(speed, joints[j].speed);
-    // A URDF without a limit, and a single sample: nothing is known of its motion.
-    if (std::isinf(speed)) {
+    if (!std::isfinite(speed)) {
       q_[j] = std::nan("");
       joint_problems_[j] = {
-          "of joint '" + joints[j].name + "' a single position has come, " +
+          "of joint '" + joints[j].name + "' less than three positions have come, the last " +
               format_text("%.3f s ago, and the URDF has no limit of its velocity", lag),
           true};
       continue;
@@ -172,9 +171,9 @@ void JointPoseSource::find_lags(const ros::Time& instant) {
     lags_[j].distance = speed * lag;
     is_any_late = is_any_late || lags_[j].distance > 0.0;
   }
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (joints[j].source == j || has_own(j)) continue;
-    lags_[j].distance = std::abs(joints[j].multiplier) * lags_[joints[j].source].distance;
+  for (const std::size_t j : kinematics_->mimics()) {
+    if (has_own(j)) continue;
+    lags_[j].distance = std::abs(joints[j].mimic.multiplier) * lags_[joints[j].leader].distance;
   }
   if (!is_any_late) lags_.clear();
 }
@@ -250,9 +249,8 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   const bool root_known =
       look_up_in_tf(fixed_frame_, kinematics_->bodies()[0], now, instant, &X_FR_, &root_problem);
   // A mimic joint is unknown for the same reason as the joint that it follows, or its own.
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (joints[j].source == j) continue;
-    if (!has_own(j)) joint_problems_[j] = joint_problems_[joints[j].source];
+  for (const std::size_t j : kinematics_->mimics()) {
+    if (!has_own(j)) joint_problems_[j] = joint_problems_[joints[j].leader];
     joints_.known[j] = joints_.known[j] && joint_problems_[j].empty();
   }
   poses->stamp = instant;

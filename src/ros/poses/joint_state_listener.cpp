@@ -63,8 +63,8 @@ void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinema
     index_[joint.name] = j;
     if (joint.type == JointType::kFixed) {
       put_into_tf(j, 0.0, ros::Time(), urdf_);
-    } else if (!joint.has_unstated_pose() && joint.source != j) {
-      led_by_[joint.source].push_back(j);
+    } else if (joint.leader != j) {
+      led_by_[joint.leader].push_back(j);
     }
   }
 }
@@ -309,7 +309,7 @@ void JointStateListener::use(const Stated& stated, const ros::Time& stamp,
   if (is_later) follow(stated.joint, stated.q, stamp, publisher);
 }
 
-/// Moves the mimics of a joint that has moved, but for those that are stated.
+/// Moves the mimics of a joint that has moved, and theirs, but for those that are stated.
 void JointStateListener::follow(std::size_t leader, double q, const ros::Time& stamp,
                                 const std::string& publisher) {
   for (const std::size_t j : led_by_[leader]) {
@@ -318,8 +318,10 @@ void JointStateListener::follow(std::size_t leader, double q, const ros::Time& s
     const bool has_stopped = !own.strays && seconds_between(own.stamp, stamp) > kMaxSpacing;
     if (own.stamp.isZero() || has_stopped) own = JointPosition();
     if (!own.stamp.isZero()) continue;
-    const Kinematics::Joint& joint = kinematics_->joints()[j];
-    put_into_tf(j, joint.multiplier * q + joint.offset, stamp, publisher);
+    const Mimic& mimic = kinematics_->joints()[j].mimic;
+    const double q_led = mimic.multiplier * q + mimic.offset;
+    put_into_tf(j, q_led, stamp, publisher);
+    follow(j, q_led, stamp, publisher);
   }
 }
 

@@ -77,8 +77,10 @@ std::string StatedPoseSource::why_strays(std::size_t joint, const ros::Time& now
 void StatedPoseSource::check_mimics(const ros::Time& now, std::vector<PoseProblem>* problems) {
   const auto& joints = kinematics_->joints();
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    const std::size_t source = joints[j].source;
-    if (source == j || !std::isnan(q_[j]) || std::isnan(q_[source])) continue;
+    std::size_t led_by = j;
+    while (std::isnan(q_[led_by]) && joints[led_by].leader != led_by)
+      led_by = joints[led_by].leader;
+    if (led_by == j || std::isnan(q_[led_by])) continue;
     std::string why = why_strays(j, now);
     if (why.empty()) continue;
     (*problems)[j] = {why, true};
@@ -100,7 +102,10 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
                                   Eigen::Isometry3d* X) {
     ros::Time stamp;
     std::string problem = look_up_newest(buffer_, to, from, now, timeout_, X, &stamp);
-    if (problem.empty() && !stamp.isZero()) instant = std::min(instant, stamp);
+    if (!problem.empty() || stamp.isZero()) return problem;
+    instant = std::min(instant, stamp);
+    // Transforms may be stamped ahead.
+    if (stamp_ == Stamp::kNow && stamp > now) problem = ist::look_up(buffer_, to, from, now, X);
     return problem;
   };
   std::string problem = look_up_latest(fixed_frame_, bodies[0], &X_FR_);

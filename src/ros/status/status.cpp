@@ -56,11 +56,21 @@ Rank rank_of(const SourceReport& source, const Vouchers& vouchers, bool has_mode
   return has_model ? Rank::kUnusable : Rank::kRemark;  // no cloud can be used without a model
 }
 
+/// [s] What a known world states counts late where one of its messages is read for longer.
+constexpr double kLongReading = 0.5;
+
+/// The doubt about a source whose obstacles count all the same; empty: none.
+std::string doubt_of(const SourceReport& source) {
+  if (source.measures || source.working <= kLongReading) return source.doubt_of_place;
+  return format_text("a message has been read for %.1f s so far: what it states does not count yet",
+                     source.working);
+}
+
 void note_sources(const StatusInput& input, double now, Findings* findings) {
   const Vouchers vouchers(input);
   for (const SourceReport& source : input.sources) {
     const Status& status = source.status;
-    const std::string& doubt = source.doubt_of_place;
+    const std::string doubt = doubt_of(source);
     if (status.ok() && doubt.empty()) continue;
     const std::string what = "input " + source.name;
     if (!doubt.empty()) {

@@ -66,14 +66,17 @@ void TrajectoryWatch::fill(const std::vector<LinkClearance>& found, const std::v
 // @param link  that touches first, as ~proximity counts
 void TrajectoryWatch::fill_contact(std::size_t link, double contact, double now, Message* message) {
   message->state = Message::CONTACT;
-  message->contact = trajectory_.instant(contact);
+  // What is in the way where the robot is counts at once, also before it begins to move.
+  const bool is_now = contact <= now;
+  message->contact = is_now ? message->header.stamp : trajectory_.instant(contact);
   message->time_to_contact = (message->contact - message->header.stamp).toSec();
   message->text = format_text("link '%s' may touch an obstacle in %.2f s",
                               model_->links[link].c_str(), message->time_to_contact);
   if (config_.deceleration.is_stated()) {
     const double way =
         braking_way(trajectory_.pieces, now, contact, config_.deceleration.of(*model_->kinematics));
-    message->brake = trajectory_.instant(std::max(now, contact - way));
+    message->brake =
+        is_now ? message->header.stamp : trajectory_.instant(std::max(now, contact - way));
     message->text +=
         format_text("; braking is due in %.2f s", (message->brake - message->header.stamp).toSec());
   }

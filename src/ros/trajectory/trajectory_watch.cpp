@@ -88,6 +88,7 @@ std::string TrajectoryWatch::take_trajectory() {
     received_.reset();
     is_watching_ = false;
     refusal_.clear();
+    trajectory_ = WatchedTrajectory();
     return "";
   }
   if (received_) {
@@ -95,10 +96,11 @@ std::string TrajectoryWatch::take_trajectory() {
     const bool needs_states = received_->points[0].time_from_start.toSec() > 0.0;
     const bool may_come = ros::Time::now() < received_time_ + ros::Duration(0.2);
     if (needs_states && positions_.empty() && may_come) return "joint states are waited for";
-    trajectory_ = WatchedTrajectory();
+    const WatchedTrajectory before = std::exchange(trajectory_, WatchedTrajectory());
     refusal_ = read_trajectory(
         *received_, *stated_.model()->kinematics,
         [this](const std::string& joint) { return present(joint); }, received_time_, &trajectory_);
+    note_before(before);
     received_.reset();
     model_ = stated_.model();
     if (!refusal_.empty()) {
@@ -106,14 +108,30 @@ std::string TrajectoryWatch::take_trajectory() {
           "the last trajectory is not watched, and neither is what ran before it: " + refusal_;
     }
   }
-  if (refusal_.empty() && model_->kinematics != stated_.model()->kinematics) {
+  if (!refusal_.empty()) return refusal_;
+  if (model_->kinematics != stated_.model()->kinematics) {
     refusal_ = "the robot is another one since the trajectory came: send it again";
+  }
+  model_ = stated_.model();  // an object may be attached meanwhile
+  const double wait = (followed_until_ - ros::Time::now()).toSec();
+  if (refusal_.empty() && wait > 0.0) {
+    return format_text("what is followed until this trajectory begins, in %.2f s, is not watched",
+                       wait);
   }
   return refusal_;
 }
 
-// Compares the robot with the trajectory. @returns empty, or which joint is where
-std::string TrajectoryWatch::why_elsewhere(double time) const {
+// Controllers follow a trajectory until the one that replaces it begins.
+void TrajectoryWatch::note_before(const WatchedTrajectory& before) {
+  if (!before.pieces.times.empty() && before.start < trajectory_.start) {
+    followed_until_ = std::max(followed_until_, before.instant(before.end()));
+  }
+  followed_until_ = std::min(followed_until_, trajectory_.start);
+}
+
+// Compares the robot with the trajectory, which is taken to begin in the turn that a joint without
+// limits is in: its mimics may be elsewhere in another one. @returns empty, or which joint is where
+std::string TrajectoryWatch::why_elsewhere(double time) {
   const std::vector<double> q = positions_at(trajectory_.pieces, time);
   for (const std::size_t joint : trajectory_.joints) {
     const Kinematics::Joint& one = model_->kinematics->joints()[joint];
@@ -123,6 +141,8 @@ std::string TrajectoryWatch::why_elsewhere(double time) const {
       return "the position of joint '" + name + "' is not known: joint_states must hold it";
     }
     const double off = distance_between(one, q_now, q[joint]);
+    const double turns = q_now - q[joint] - off;  // [rad] whole ones
+    for (std::vector<double>& at : trajectory_.pieces.positions) at[joint] += turns;
     if (std::abs(off) <= config_.trajectory.tolerance) continue;
     return format_text(
         "the robot does not follow the trajectory: joint '%s' is at %.3f and should be at %.3f, "
@@ -199,14 +219,17 @@ double TrajectoryWatch::obstacle_age(const ros::Time& now, double time) const {
 std::vector<bool> TrajectoryWatch::moved_links(const ros::Time& now) const {
   const RobotModel& robot = *model_->robot;
   const Kinematics& kinematics = *model_->kinematics;
-  const std::vector<std::size_t>& moved = trajectory_.joints;
+  const auto is_named = [&](std::size_t joint) {
+    const std::vector<std::size_t>& moved = trajectory_.joints;
+    return std::find(moved.begin(), moved.end(), joint) != moved.end();
+  };
   const auto is_moved = [&](std::size_t body) {
     for (; body != 0; body = kinematics.joints()[body - 1].parent) {
-      const std::size_t source = kinematics.joints()[body - 1].source;
-      if (std::find(moved.begin(), moved.end(), source) != moved.end() ||
-          std::find(moved.begin(), moved.end(), body - 1) != moved.end()) {
-        return true;
+      std::size_t joint = body - 1;
+      while (!is_named(joint) && kinematics.joints()[joint].leader != joint) {
+        joint = kinematics.joints()[joint].leader;  // a mimic moves with it
       }
+      if (is_named(joint)) return true;
     }
     return false;
   };

@@ -52,7 +52,8 @@ class TrajectoryWatch : public AddOn {
   void receive_state(const sensor_msgs::JointStateConstPtr& message);
   JointMotionNow present(const std::string& joint) const;
   std::string take_trajectory();
-  std::string why_elsewhere(double time) const;
+  void note_before(const WatchedTrajectory& before);
+  std::string why_elsewhere(double time);
   void look(const ros::Time& now, Message* message);
   double obstacle_age(const ros::Time& now, double time) const;
   void fill(const std::vector<LinkClearance>& found, const std::vector<bool>& moved, double now,
@@ -76,6 +77,7 @@ class TrajectoryWatch : public AddOn {
   bool is_watching_ = false;  ///< a trajectory, or one that was refused
   std::string refusal_;       ///< why the last one is not watched; empty: it is
   WatchedTrajectory trajectory_;
+  ros::Time followed_until_;                  ///< when the one before it ends
   std::shared_ptr<const ModelState> model_;   ///< of the trajectory's joints
   ist_proximity::ProximityArray here_;        ///< the robot where it is to be now
   std::vector<const CloudSnapshot*> clouds_;  ///< those of the last answer
