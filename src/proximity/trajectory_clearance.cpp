@@ -33,6 +33,17 @@ struct Advance {
   double tolerance = kFirstTolerance;  // [m]
 };
 
+constexpr double kEnd =
+    1e-9;  // [s] the robot stays at its end for so long; above 1 s, a share of it
+
+// Stays where a trajectory ends, from `time` on.
+StraightPieces end_of(const StraightPieces& pieces, double time) {
+  const std::vector<double>& end = pieces.positions.back();
+  return {{time, time + kEnd * std::max(1.0, std::abs(time))},
+          {end, end},
+          {std::vector<double>(end.size(), 0.0)}};
+}
+
 bool are_bounded(const std::vector<double>& deviations) {
   return std::all_of(deviations.begin(), deviations.end(),
                      [](double one) { return one >= 0.0 && one <= kLargestMotion; });
@@ -172,6 +183,11 @@ void TimeOfImpact::run(const StraightPieces& pieces, double from, const JointPos
       !(obstacle_age >= 0.0) || !std::isfinite(from)) {
     return;
   }
+  if (pieces.times.size() == 1 || pieces.times.back() <= from) {
+    const double end = std::max(from, pieces.times.back());
+    return run(end_of(pieces, end), end, still, X_FR, wanted, clouds, worlds, obstacle_speed,
+               obstacle_age, results);
+  }
   std::vector<Advance> advances;
   for (std::size_t i = 0; i < count; ++i) {
     if (wanted[i] && impl.moved.forward().body(i) && impl.model->links[i].usable()) {
@@ -181,28 +197,19 @@ void TimeOfImpact::run(const StraightPieces& pieces, double from, const JointPos
   const auto all_unknown = [&] { results->assign(count, LinkClearance()); };
   impl.carried.take(worlds, impl.moved.forward().kinematics());
   const ImpactObstacles obstacles{clouds, impl.carried.worlds()};
-  const auto run_piece = [&](const JointMotion& motion, double begin,
-                             const std::vector<double>& deviation) {
-    const bool is_known = deviation.size() == motion.from.size() && are_bounded(deviation);
-    if (!is_known || !impl.moved.begin(motion, still)) return false;
-    impl.bound_carried();
-    Impl::Piece piece(&impl, begin, from, deviation, X_FR, obstacles, obstacle_speed, obstacle_age);
-    for (Advance& advance : advances) {
-      if (!advance.is_over) piece.run(&advance);
-    }
-    return true;
-  };
   for (std::size_t k = 0; k + 1 < pieces.times.size(); ++k) {
     if (pieces.times[k + 1] <= from) continue;
     const JointMotion motion{pieces.positions[k], pieces.positions[k + 1],
                              pieces.times[k + 1] - pieces.times[k]};
-    if (!run_piece(motion, pieces.times[k], pieces.deviations[k])) return all_unknown();
-  }
-  if (pieces.times.size() == 1 || pieces.times.back() <= from) {  // the robot stays at its end
-    const std::vector<double>& end = pieces.positions.back();
-    const std::vector<double> none(end.size(), 0.0);
-    if (!run_piece({end, end, 1.0}, std::max(from, pieces.times.back()), none))
-      return all_unknown();
+    const bool is_known = pieces.deviations[k].size() == pieces.positions[k].size() &&
+                          are_bounded(pieces.deviations[k]);
+    if (!is_known || !impl.moved.begin(motion, still)) return all_unknown();
+    impl.bound_carried();
+    Impl::Piece piece(&impl, pieces.times[k], from, pieces.deviations[k], X_FR, obstacles,
+                      obstacle_speed, obstacle_age);
+    for (Advance& advance : advances) {
+      if (!advance.is_over) piece.run(&advance);
+    }
   }
   for (Advance& advance : advances) {
     if (!advance.is_over) advance.found->contact_time = kInfinity;

@@ -348,7 +348,8 @@ TEST(TrajectoryClearance, theEndIsMeasured) {
   for (const double x : {0.35, 0.25}) {
     const CloudSnapshot cloud = test::make_snapshot({Eigen::Vector3d(x, 0.0, 0.0)});
     const StraightPieces point{{0.0}, {{0.2}}, {}}, way{{0.0, 1.0}, {{0.0}, {0.2}}, {{0.0}}};
-    for (const auto& [pieces, from] : {std::pair(point, 0.0), std::pair(way, 1.0)}) {
+    for (const auto& [pieces, from] :
+         {std::pair(point, 0.0), std::pair(point, 1e12), std::pair(way, 1.0)}) {
       std::vector<LinkClearance> found;
       impacts.run(pieces, from, still, Eigen::Isometry3d::Identity(), {true}, {&cloud}, {}, 0.0,
                   0.0, &found);

@@ -109,7 +109,8 @@ GeometryElement to_element(const Message& message, const PackageFinder& find_pac
 
 std::string object_frame(const std::string& stated, const std::string& other) {
   if (stated.empty()) return other;
-  if (without_slash(stated).empty() || stated == kFixedFrame) {
+  const std::string name = without_slash(stated);
+  if (name.empty() || name == kFixedFrame) {
     throw ModelError("header.frame_id is '" + stated + "', which is no frame of tf");
   }
   return stated;
