@@ -203,7 +203,10 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FP, Span<cons
       on_robot->set_poses(robot, crop.X_FO, config.self_filter_padding, paddings);
     }
   }
-  if (!extent.is_zero()) extent.p_FS = X_FC.translation();
+  if (!extent.is_zero()) {
+    extent.p_FS = X_FC.translation();
+    extent.allow_for(cloud.sensor_moved);
+  }
   const ZoneFilter* zones = nullptr;
   if (impl_->zones.is_active()) {
     impl_->zones.begin_cloud(crop.X_FO, extent);

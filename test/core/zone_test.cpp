@@ -29,12 +29,14 @@ constexpr double kRounding = 1e-5;  // [m] that a point may be off a zone's surf
 // A camera's image of a wavy surface, or points all over a room.
 struct Picture {
   Points points;
-  std::size_t width = 0;  // 0: a list
+  std::size_t width = 0;      // 0: a list
+  double sensor_moved = 0.0;  // [m]
 
   RawCloud raw() const {
     const std::size_t columns = width > 0 ? width : points.size();
     RawCloud cloud = packed_cloud(points[0].data(), columns, points.size() / columns);
     cloud.owner = std::shared_ptr<const void>(points.data(), [](const void*) {});
+    cloud.sensor_moved = sensor_moved;
     return cloud;
   }
 };
@@ -112,6 +114,7 @@ Case random_case(test::Rng* rng, bool is_image, bool has_extent,
     one.config.extent.noise_constant = 0.002;
     one.config.extent.noise_quadratic = 0.001;
     one.config.extent.max_range = 10.0;
+    one.picture.sensor_moved = test::uniform(rng, 0.0, 0.5);
   }
   for (int i = 0; i < 5; ++i) {
     const auto& p = one.picture.points[(*rng)() % one.picture.points.size()];

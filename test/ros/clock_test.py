@@ -196,6 +196,21 @@ class ClockTest(pt.NodeTest):
             self.assertEqual(m.links[0].source, "cloud/memory")
             self.assertLessEqual(m.links[0].lower_bound, distance_to(FAR))
 
+    def test_filter_while_the_clock_stands(self):
+        self.clock.start()
+        rospy.set_param("/standing_filter/robot_description", SLIDES)
+        one = Filter("/standing_filter", command_type="sensor_msgs/JointState")
+        command = JointState(name=JOINTS, velocity=[0.1, 0.0])
+        commands = pt.Repeater(50, lambda: one.publisher.publish(command))
+        pt.wait_until(lambda: one.states, "the filter")
+        self.assertFalse(any("stands still" in s.status_text for s in one.states))
+        self.clock.step = 0.0
+        pt.wait_until(lambda: "clock stands still" in one.states[-1].status_text, "the fault")
+        self.clock.step = 0.005
+        pt.wait_until(lambda: "clock stands still" not in one.states[-1].status_text, "its end")
+        commands.stop()
+        self.assertEqual(one.stop(), 0)
+
     def test_filter_without_commands(self):
         """The last command is from the future then, and 0 is given all the same."""
         clock = self.clock

@@ -188,6 +188,34 @@ class DepthImageTest(pt.NodeTest):
             self.assertAlmostEqual(one.interval_sensor, distances.min() - truth, 3)
             self.assertEqual(one.interval_model, 0.0)
 
+    def test_extent_of_what_is_hidden(self):
+        """What was measured with wide pixels stays as uncertain, whatever measures now."""
+        ball = X_BASE_CAMERA @ pt.transform((0, 0, 1.2))
+        self.world.stand(ball, X_BASE_CAMERA @ pt.transform((0, 0, 9)))
+        memory = {"enabled": True, "decay": 1000.0, "resolution": 0.01}
+        self.start_camera(footprint="camera", max_range=3.0, memory=memory)
+        shown = [np.full((HEIGHT, WIDTH), 1.6, np.float32)]
+        self.stream(lambda: image(shown[0], "32FC1"))
+        bounds = []
+
+        def wait(source, count):
+            first = len(self.node.messages)
+            is_it = lambda m: m.status == ProximityArray.OK and pt.link(m, "ball_link").source == source  # noqa: E731
+            self.node.wait_until(
+                lambda: sum(map(is_it, self.node.messages[first:])) > count, source
+            )
+            bounds.append(pt.link(self.node.messages[-1], "ball_link").lower_bound)
+
+        wait("depth", 60)
+        shown[0] = np.full((HEIGHT, WIDTH), 0.3, np.float32)
+        wait("depth/memory", 60)
+        narrow = np.array(self.info.P)
+        narrow[[0, 5]] *= 10.0
+        self.info = camera_info(P=list(narrow))
+        wait("depth/memory", 200)
+        self.assertLess(bounds[1], bounds[0] + 1e-6)
+        self.assertLess(bounds[2], bounds[1] + 1e-3)
+
     def test_footprint_of_no_camera(self):
         """A cloud that is no image has no angle between pixels: it is not used, and why is said."""
         clouds = rospy.Publisher(self.namespace + "/points", PointCloud2, queue_size=1)

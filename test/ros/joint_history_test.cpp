@@ -103,6 +103,26 @@ TEST_F(JointHistoryTest, MovedSinceTheSamplesThatANodeMayHold) {
   EXPECT_NEAR(moved[left_], 1.5, 1e-6);
 }
 
+// A simulated clock has steps: a node has answered for the first state of one.
+TEST_F(JointHistoryTest, MovedSinceTheFirstOfOneStamp) {
+  add("left", 0.0, 10.0, 10.0);
+  for (int k = 1; k <= 50; ++k) add("left", 0.1 * k, 10.1, 10.1);
+  std::vector<double> q, moved;
+  ASSERT_TRUE(history_.at(ros::Time(10.1), &q, &moved));
+  EXPECT_EQ(q[left_], 0.1);
+  EXPECT_NEAR(moved[left_], 4.9, 1e-9);
+  EXPECT_EQ(history_.newest(left_), 5.0);
+}
+
+// Mimic joints are needed once they are stated.
+TEST_F(JointHistoryTest, AgesOfMimicJoints) {
+  add("left", 0.0, 10.0, 10.0);
+  EXPECT_NEAR(history_.age(ros::Time(10.1)), 0.1, 1e-6);
+  add("right", 0.0, 10.0, 10.0);
+  add("left", 0.0, 10.3, 10.3);
+  EXPECT_NEAR(history_.age(ros::Time(10.4)), 0.4, 1e-6);
+}
+
 TEST_F(JointHistoryTest, TakesStampsThatAreAheadForPresentOnes) {
   add("left", 0.1, 10.8, 10.0);
   add("left", 0.2, 10.9, 10.1);

@@ -343,6 +343,42 @@ class JointStatesTest(pt.NodeTest):
             after_two += sent[1] < message.header.stamp < sent[2]
         self.assertGreater(after_two, 5)
 
+    def check_late_joint(self, place, period, counts, is_silent=lambda phase: False, rate=100):
+        """Bounds hold at the stamps of a joint that comes all the time, where the motion `counts`."""
+        sent = []
+        node = self.start(max_distance=3.0, self_filter=False)
+
+        def send_slide():
+            stamp = rospy.Time.now()
+            if not is_silent(stamp.to_sec() % period):
+                self.publisher.publish(joint_state({"slide": place(stamp.to_sec() % period)}, stamp))
+                sent.append(stamp)
+
+        self.world.start_joints({"turn": 0.0})
+        self.world.start_points(np.array([[1.2, 0.0, 0.5]]))
+        self.world.repeat(rate, send_slide)
+        node.wait_for_status(ProximityArray.OK)
+        over = []
+        for message in node.next_messages(800):
+            phase = message.header.stamp.to_sec() % period
+            one = pt.link(message, "ball_link")
+            if one.state == LinkProximity.UNKNOWN or not counts(phase):
+                continue
+            over.append(one.lower_bound - (1.1 - place(phase)))
+        self.assertGreater(len(over), 50)
+        self.assertLess(max(over), 5e-4)
+
+    def test_a_joint_that_is_faster_than_its_limit(self):
+        """To and fro at 2 m/s; its URDF says 1 m/s."""
+        self.check_late_joint(
+            lambda t: 0.1 + 2.0 * min(t, 0.8 - t), 0.8, lambda t: t % 0.4 > 0.25, rate=20
+        )
+
+    def test_a_joint_that_is_silent_while_it_speeds_up(self):
+        """At 8 m/s^2 for 0.3 s of each 1.2 s, and silent for 0.06 s of it."""
+        place = lambda t: 0.1 + (4.0 * t * t if t < 0.3 else 0.36)  # noqa: E731
+        self.check_late_joint(place, 1.2, lambda t: 0.1 < t < 0.25, lambda t: 0.18 < t < 0.24)
+
     def test_burst(self):
         """Joint states that come all at once are answered one by one, in their order."""
         node = self.start(pose_timeout=5.0)

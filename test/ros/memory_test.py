@@ -304,6 +304,17 @@ class MemoryTest(pt.NodeTest):
         for message in self.node.messages[begin:]:
             self.assertLess(self.ball(message).lower_bound, to_side + 2 * VOXEL)
 
+    # What is known about one link is no more for another one's padding.
+    def test_unknown_space_beside_a_padding_of_another_link(self):
+        self.world.points = patch(2.4, 0.72, 0.015)
+        self.world.stand(pt.transform((0.5, 1.2, 0)), pt.transform((0, 0, 5)))  # the camera sees neither
+        padding = {"default": 0.02, "box_link": 0.5}
+        self.start(memory=LASTING, unknown_space="obstacle", max_distance=2.0, self_filter_padding=padding)
+        told = self.node.wait_for(
+            lambda m: m.status == ProximityArray.OK and self.ball(m).unseen_distance > -0.05, "a skin"
+        )
+        self.assertLess(self.ball(told).unseen_distance, 0.02 + VOXEL)
+
     # What a joint may have moved since its last sample comes off the distance from unseen space, too.
     def test_unknown_space_beside_a_joint_that_is_late(self):
         place = lambda t: abs(t % 1.2 - 0.6) - 0.3  # 1 m/s to and fro

@@ -384,6 +384,11 @@ TEST(TransformBuffer, inGapsOfWhatHasMovedNoPoseIsKnown) {
   add(103.3, 4.5);
   EXPECT_EQ(problem(103.5), "");
 
+  add(102.2, 7.0);  // it was elsewhere where it seemed to have stood
+  EXPECT_NE(problem(102.0), "");
+  EXPECT_NE(problem(102.6), "");
+  EXPECT_EQ(problem(102.2), "");
+
   add(106.0, 9.0);
   EXPECT_NE(problem(105.0), "");
 

@@ -32,6 +32,11 @@ TEST(UnknownSpace, CountsForTheRobotAndTheFrameThatItWasSeenFor) {
                     "the fixed frame is another one since it was seen");
   test::expect_says(why_unusable(unknown, *unknown.robot, "base", ros::Time(90.0)),
                     "what was seen last is of 10.00 s after the present");
+  unknown.found = 100.0;
+  unknown.lasts = 1.0;
+  EXPECT_EQ(why_unusable(unknown, *unknown.robot, "base", ros::Time(101.0)), "");
+  test::expect_says(why_unusable(unknown, *unknown.robot, "base", ros::Time(101.5)),
+                    "was found 1.50 s ago");
 }
 
 }  // namespace

@@ -146,8 +146,13 @@ class VelocityFilterTest(SlidesTest):
         has_post = "post" in self._testMethodName
         has_padding = "padding" in self._testMethodName
         robot = REDUNDANT if "redundant" in self._testMethodName else SLIDES
-        if "apart_seldom" in self._testMethodName:  # both joints slide along x, as fast
+        if "apart" in self._testMethodName and "seldom" in self._testMethodName:  # both joints slide along x, as fast
             robot = SLIDES.replace('"0 1 0"', '"1 0 0"').replace("0.4", "2")
+        if "mimic" in self._testMethodName:  # the ball hangs on one that follows the other
+            robot = robot.replace('link="beam"/><child link="ball"', 'link="base"/><child link="ball"')
+            robot = robot.replace('<child link="ball"/>', '<child link="ball"/><mimic joint="along"/>')
+        if "limit" in self._testMethodName:
+            robot = SLIDES.replace('upper="5" velocity="2"', 'upper="0.6" velocity="2"')
         if "base" in self._testMethodName:
             robot = robot.replace("</robot>", BASE)
         super().start(
@@ -554,6 +559,29 @@ class VelocityFilterTest(SlidesTest):
 
     def test_joint_states_that_come_seldom(self):
         self.check_seldom_states(2.0, 0.0)
+
+    def test_a_mimic_that_is_stated_apart_and_seldom(self):
+        """The ball hangs on it, and goes as fast as the joint that is commanded."""
+        self.send_joints = lambda q: self.joint_publisher.publish(pt.joint_state({"across": q[0]}))
+        self.world.repeat(
+            100, lambda: self.joint_publisher.publish(pt.joint_state({"along": self.q[0]}))
+        )
+        self.given_velocity = lambda message: np.array([message.velocity[0], message.velocity[0]])
+        self.command = lambda *velocity: self.filter.publisher.publish(
+            JointState(name=JOINTS[:1], velocity=velocity[:1])
+        )
+        self.check_seldom_states(2.0, 2.0, least=0.015, command_type="sensor_msgs/JointState")
+
+    def test_a_limit_between_seldom_states(self):
+        """What was given since the joints were stated counts for their limits, too."""
+        self.clouds.stop()
+        self.world.points = wall() + [3.0, 0, 0]
+        self.clouds = self.world.start_clouds()
+        self.seldom = 9
+        self.start(2.0, 0.0)
+        pt.wait_until(lambda: self.q[0] > 0.55, "the ball to come near its limit")
+        rospy.sleep(0.5)
+        self.assertLess(self.q[0], 0.6 + 0.02)
 
     def test_joints_commanded_apart_seldom_stated(self):
         """Each command counts with what the other joint was told to do."""

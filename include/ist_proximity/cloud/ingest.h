@@ -70,6 +70,7 @@ struct RawCloud {
   /// Each point is a range along a ray from the origin (depth images and scans). An infinite one
   /// means that nothing is in range, and one at the origin that nothing was measured.
   bool from_rays = false;
+  double sensor_moved = 0.0;  ///< [m] the origin's largest way while the points were measured
   /// [m] Farther points were not measured, whatever IngestConfig says.
   double believed_range = std::numeric_limits<double>::infinity();
   /// `data` stays unchanged as long as this lives, so that points may be read later, when a query

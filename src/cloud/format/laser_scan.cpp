@@ -116,6 +116,7 @@ RawCloud ScanPoints::raw() const {
   RawCloud cloud = packed_cloud(xyz.data(), xyz.size() / 3, 1);
   cloud.pixel_angle = beam_angle;
   cloud.from_rays = true;
+  cloud.sensor_moved = sensor_moved;
   cloud.believed_range = 0.5 * (kFar + kImplausible);
   return cloud;
 }

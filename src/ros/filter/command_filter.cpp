@@ -37,6 +37,8 @@ constexpr std::uint32_t kQueue = 10;
 const ros::WallDuration kZeroPeriod(0.01);
 // [s] For so long, joints that are not commanded any more are given 0 beside others that are.
 constexpr double kHalted = 0.5;
+// Of a simulated clock, whose steps are shorter.
+constexpr std::chrono::milliseconds kClockStands(300);
 // Time in which the last velocity leaves: roscpp sends by another thread, and drops what a
 // publisher has not sent when it goes.
 const ros::WallDuration kLeave(0.1);
@@ -267,6 +269,7 @@ void CommandFilter::take(const ist_proximity::ProximityArray::ConstPtr& answers,
 bool CommandFilter::clock_has_gone_back() {
   const ros::Time now = ros::Time::now();
   const bool has = now < last_now_;
+  if (now != last_now_) clock_moved_ = std::chrono::steady_clock::now();
   last_now_ = now;
   if (!has) return false;
   tf_.clear();
@@ -321,6 +324,9 @@ std::string CommandFilter::why_not(const JointCommand& command, const ros::Time&
   for (const std::string& joint : command.joints) {
     if (column_of(joint)) continue;
     return "the robot has no joint '" + joint + "' with a position of its own";
+  }
+  if (std::chrono::steady_clock::now() - clock_moved_ > kClockStands) {
+    return "the clock stands still, so that nobody knows how old anything is";
   }
   std::string late = history_->late_joint(now, config_.joint_timeout);
   if (!late.empty()) return late;
@@ -436,6 +442,11 @@ const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::T
   for (std::size_t c = 0; c < q_column_.size(); ++c) q_column_[c] = q_now_[proximity_->joints()[c]];
   hold_others(is_commanded, now);
   take_off_given(now, config_.rows.horizon);
+  // A limit may be as near as if all of it had been done.
+  for (std::size_t c = 0; c < q_column_.size(); ++c) {
+    const double went = went_[static_cast<Eigen::Index>(c)];
+    if (went * command_column_[c] > 0.0) q_column_[c] += went;
+  }
   return filter_->run(command_column_, q_column_, rows_, kTimeLimit);
 }
 
@@ -485,11 +496,13 @@ void CommandFilter::note_given(const FilterState& state, bool replaces_all) {
 void CommandFilter::take_off_given(const ros::Time& now, double horizon) {
   const double age = history_->age(now);
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(rows_.sweep.cols());
+  went_ = moved;
   double until = 0.0;  // [s] before now
   for (auto given = given_.rbegin(); given != given_.rend() && until < age; ++given) {
     const double from = std::clamp(seconds_between(given->time, now), until, age);
     const Eigen::Map<const Eigen::VectorXd> velocity(given->velocity.data(), moved.size());
     moved += (from - until) * velocity.cwiseAbs();
+    went_ += (from - until) * velocity;
     until = from;
   }
   for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.count); ++i) {

@@ -114,11 +114,13 @@ class CommandFilter {
     std::vector<double> velocity;  ///< [rad/s, m/s] by column
   };
   std::deque<Given> given_;  ///< of the time that joint states may be old
+  Eigen::VectorXd went_;     ///< [rad, m] by column: what that was since the joints were stated
 
   ros::Publisher safe_command_, state_, scale_, markers_;
   ros::Subscriber command_, answers_, self_answers_, joints_, node_scale_;
   ros::WallTimer timer_;
   ros::Time last_now_, last_command_;
+  std::chrono::steady_clock::time_point clock_moved_;
   double given_scale_ = 0.0;   ///< of the last command
   double newest_scale_ = 0.0;  ///< the node's, without a command
   ros::Time newest_scale_came_;

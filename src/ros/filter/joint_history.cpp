@@ -61,7 +61,9 @@ void JointHistory::append(Sample sample, Samples* samples) {
     const bool was_ahead = last.sent > last.stamp;
     if (sample.sent < last.sent && (!was_ahead || sample.stamp < last.stamp)) return;
     sample.stamp = std::max(sample.stamp, last.stamp);
-    if (sample.sent == last.sent) samples->pop_back();
+    // While the clock stands, the first one is what a node may have answered for.
+    const std::size_t count = samples->size();
+    if (count > 1 && sample.sent == (*samples)[count - 2].sent) samples->pop_back();
   }
   samples->push_back(sample);
   while (samples->size() > 1 && seconds_between((*samples)[1].stamp, sample.stamp) > kKept) {
@@ -148,10 +150,16 @@ double JointHistory::velocity(std::size_t joint, double window) const {
   return kNaN;
 }
 
+/// Whether it has a position of its own, or is a mimic joint that is stated.
+bool JointHistory::is_needed(std::size_t joint) const {
+  const Kinematics::Joint& at = kinematics_->joints()[joint];
+  return at.is_free() || (at.source != joint && !samples_[joint].empty());
+}
+
 double JointHistory::age(const ros::Time& now) const {
   double oldest = 0.0;
   for (std::size_t j = 0; j < samples_.size(); ++j) {
-    if (!kinematics_->joints()[j].is_free()) continue;
+    if (!is_needed(j)) continue;
     if (samples_[j].empty()) return kInfinity;
     oldest = std::max(oldest, seconds_between(samples_[j].back().stamp, now));
   }
@@ -162,8 +170,7 @@ std::string JointHistory::late_joint(const ros::Time& now, double timeout) const
   const auto& joints = kinematics_->joints();
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const Samples& samples = samples_[j];
-    const bool is_stated_mimic = joints[j].source != j && !samples.empty();
-    if (!joints[j].is_free() && !is_stated_mimic) continue;
+    if (!is_needed(j)) continue;
     if (samples.empty()) return "no position of joint '" + joints[j].name + "' has been stated";
     const double age = seconds_between(samples.back().stamp, now);
     if (age > timeout) {

@@ -43,7 +43,8 @@ class JointHistory {
   /// position, or a little longer. NaN where the history does not reach back so far.
   double velocity(std::size_t joint, double window) const;
 
-  /// [s] since the oldest of the newest positions, of joints with a position of their own.
+  /// [s] since the oldest of the newest positions, of joints with a position of their own and of
+  /// mimic joints that are stated.
   double age(const ros::Time& now) const;
 
   /// A sentence about a joint with a position of its own that is not known, or about one, mimic
@@ -59,6 +60,7 @@ class JointHistory {
   using Samples = std::deque<Sample>;
 
   static void append(Sample sample, Samples* samples);
+  bool is_needed(std::size_t joint) const;
   bool is_of_one_message(const ros::Time& stamp) const;
   bool note_ahead(const Samples& samples, const ros::Time& stamp, double* moved) const;
 

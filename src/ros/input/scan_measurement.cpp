@@ -86,7 +86,6 @@ Measurement read_scan(const sensor_msgs::LaserScanConstPtr& message, const Inges
               &points, ranges.sensor_range);
     ingest->run(points.raw(), placement.X_FS, robot_by_beam(placement, scan.count, instants),
                 message->header.stamp.toSec(), snapshot, placement.paddings);
-    if (!snapshot->extent.is_zero()) snapshot->extent.allow_for(points.sensor_moved);
   };
   return measurement;
 }

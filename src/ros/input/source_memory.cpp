@@ -61,7 +61,7 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
   const std::lock_guard<std::mutex> lock(mutex_);
   cloud_stamp_ = cloud.stamp;
   counts_from_ = cloud.counts_from;
-  extent_ = extent_of_voxels(cloud.cloud.extent, map_.config().max_range);
+  note_extent(extent_of_voxels(cloud.cloud.extent, map_.config().max_range), cloud.cloud.stamp);
   told_next_.problem = insert(measurement, placement, target, cloud);
   std::shared_ptr<const SourceSnapshot> hidden;
   if (told_next_.problem.empty()) {
@@ -234,6 +234,15 @@ void SourceMemory::note_region(const RegionOfInterest& region, double stamp) {
   region_ = {region.center_F, is_whole ? region.radius : std::clamp(before, 0.0, region.radius)};
 }
 
+/// A smaller extent counts once all is forgotten that was measured with the larger one.
+void SourceMemory::note_extent(double extent, double stamp) {
+  const bool is_over = !(std::abs(stamp - extent_since_) <= map_.config().decay);
+  if (is_over) extent_ = std::exchange(later_extent_, 0.0);
+  if (is_over || extent >= extent_) extent_since_ = stamp;
+  later_extent_ = extent >= extent_ ? 0.0 : std::max(later_extent_, extent);
+  extent_ = std::max(extent_, extent);
+}
+
 void SourceMemory::forget_body() {
   body_.clear();
   links_.clear();
@@ -245,9 +254,11 @@ void SourceMemory::note_body(const Placement& placement, double stamp) {
   if (!wants_body_ || stamp - body_noted_ < kBodyPeriod) return;
   body_noted_ = stamp;
   links_.clear();
-  for (const PosedSolid& link : placement.robot) {
-    links_.push_back(
-        ist::note_body({&link, 1}, Eigen::Isometry3d::Identity(), skin(), stamp, &body_));
+  for (std::size_t i = 0; i < placement.robot.size(); ++i) {
+    const double padding =
+        placement.paddings.empty() ? config_.ingest.self_filter_padding : placement.paddings[i];
+    links_.push_back(ist::note_body({&placement.robot[i], 1}, Eigen::Isometry3d::Identity(),
+                                    skin_of(padding), stamp, &body_));
   }
 }
 
@@ -345,10 +356,12 @@ bool SourceMemory::add_to(SeenSpace* seen, KnownSpace* known) {
   return true;
 }
 
-double SourceMemory::skin() const {
+double SourceMemory::skin() const { return skin_of(config_.ingest.self_filter_padding); }
+
+double SourceMemory::skin_of(double padding) const {
   // A voxel belongs to the skin where any of it may be on the robot.
   constexpr double kHalfDiagonal = 0.87;  // of a voxel
-  return config_.ingest.self_filter_padding + kHalfDiagonal * config_.memory.map.resolution;
+  return padding + kHalfDiagonal * config_.memory.map.resolution;
 }
 
 }  // namespace ist

@@ -77,6 +77,9 @@ class SourceMemory : public ObstacleSource {
   bool add_to(SeenSpace* seen, KnownSpace* known);
   /// [m] Space nearer to a link than this counts as the robot's own.
   double skin() const;
+
+  /// [s] after which what was measured is forgotten; may be inf.
+  double decay() const { return config_.memory.map.decay; }
   const SourceConfig& config() const { return config_; }
 
  private:
@@ -96,7 +99,9 @@ class SourceMemory : public ObstacleSource {
   void note_loss(const std::string& text);
   void hand_over();
   void note_region(const RegionOfInterest& region, double stamp);
+  void note_extent(double extent, double stamp);
   void note_body(const Placement& placement, double stamp);
+  double skin_of(double padding) const;
   void forget_body();
   std::shared_ptr<const SourceSnapshot> make_snapshot(void (MemoryMap::*find_boxes)(VoxelBoxes*)
                                                           const) const;
@@ -122,7 +127,9 @@ class SourceMemory : public ObstacleSource {
   double body_noted_ = 0.0;              ///< [s]
   std::size_t lost_ = 0;                 ///< MemoryCounts::lost, as told
   ros::Time cloud_stamp_, counts_from_;  ///< of the last cloud
-  double extent_ = 0.0;                  ///< [m] of its points in voxels
+  double extent_ = 0.0;                  ///< [m] of points in voxels, the largest
+  double later_extent_ = 0.0;            ///< [m] the largest of later clouds than that one's
+  double extent_since_ = kNever;         ///< [s] stamp of the last cloud that had it
   std::chrono::steady_clock::time_point next_publication_, next_count_, next_growth_;
 
   mutable std::mutex mutex_;  ///< guards the members below

@@ -144,9 +144,9 @@ bool JointPoseSource::must_hold(const ros::Time& instant) const {
 
 /// A joint that comes less often than others keeps its position until its next sample: it moves on
 /// as fast as it did of late, or as it says, and speeds up as it did of late; until that is known,
-/// as fast as its limit. With a constant
-/// acceleration a, samples T apart and a lag up to T, that is all: its mean rate is a (T + lag) / 2
-/// more than that between its last two samples, and theirs is a T more than the one before.
+/// as fast as its limit. A constant acceleration a is allowed for: with stamps T1 and T2 apart the
+/// rates between them differ by a (T1 + T2) / 2, and the mean rate since is a (T2 + lag) / 2 more
+/// than the last one.
 void JointPoseSource::find_lags(const ros::Time& instant) {
   const auto& joints = kinematics_->joints();
   lags_.assign(joints.size(), {0.0, 0.0, 0.0});
@@ -157,9 +157,16 @@ void JointPoseSource::find_lags(const ros::Time& instant) {
     const double lag = seconds_between(position.stamp, instant);
     if (!(lag > 0.0)) continue;
     const double change = std::abs(position.rate - position.rate_before);
-    double speed = std::fmax(std::abs(position.rate), std::abs(position.velocity)) + change;
-    // What is faster than the joint's limit is a jump of what is stated; NaN: it is not known yet.
-    speed = std::fmin(speed, joints[j].speed);
+    const double share = (position.interval + lag) / (position.interval_before + position.interval);
+    double speed = std::fmax(std::abs(position.rate), std::abs(position.velocity));
+    if (std::isnan(change)) {
+      speed = std::fmax(speed, joints[j].speed);
+    } else {
+      speed += change * std::max(1.0, share);
+      // What is faster than the joint's limit once, and not before, is a jump of what is stated.
+      const double most = std::fmax(joints[j].speed, std::abs(position.velocity));
+      if (!(position.rate * position.rate_before > 0.0)) speed = std::fmin(speed, most);
+    }
     if (!std::isfinite(speed)) {
       q_[j] = std::nan("");
       joint_problems_[j] = {

@@ -297,6 +297,7 @@ void JointStateListener::use(const Stated& stated, const ros::Time& stamp,
   } else if (is_later) {
     position.rate_before = position.rate;
     position.rate = (stated.q - position.q) / interval;
+    position.interval_before = std::exchange(position.interval, interval);
     // The longest interval of late, so that one that varies is no alarm.
     position.spacing = std::max(interval, 0.9 * position.spacing + 0.1 * interval);
   }

@@ -34,6 +34,7 @@ struct JointPosition {
   /// known yet.
   double rate = std::numeric_limits<double>::quiet_NaN();
   double rate_before = std::numeric_limits<double>::quiet_NaN();
+  double interval = 0.0, interval_before = 0.0;  ///< [s] between those stamps
   /// Another joint that was in the same message; itself when there was none.
   std::size_t companion = 0;
   std::shared_ptr<const std::string> refusal;  ///< why the newest sample is not used; null: it is

@@ -29,25 +29,35 @@ bool has_moved(const geometry_msgs::TransformStamped& from,
 void TransformGaps::note(const geometry_msgs::TransformStamped& transform, double longest,
                          double kept) {
   const ros::Time& stamp = transform.header.stamp;
-  if (stamp <= newest_.header.stamp) {  // it comes late, and divides the gap that it is in
-    const Gap* gap = find(stamp);
-    if (gap == nullptr) return;
-    const Gap parts[] = {{gap->begin, stamp}, {stamp, gap->end}};
-    gaps_.erase(gaps_.begin() + (gap - gaps_.data()));
-    for (const Gap& part : parts) {
-      if (seconds_between(part.begin, part.end) > longest) gaps_.push_back(part);
-    }
-    return;
+  if (stamp > newest_.header.stamp) {
+    const auto is_old = [&](const ros::Time& end) { return seconds_between(end, stamp) > kept; };
+    pauses_.erase(
+        std::remove_if(pauses_.begin(), pauses_.end(),
+                       [&](const Pause& pause) { return is_old(pause.after.header.stamp); }),
+        pauses_.end());
+    if (!newest_.header.stamp.isZero()) add_if_long({newest_, transform}, longest);
+    newest_ = transform;
+  } else {
+    const auto divided = std::find_if(pauses_.begin(), pauses_.end(), [&](const Pause& pause) {
+      return pause.before.header.stamp < stamp && stamp < pause.after.header.stamp;
+    });
+    if (divided == pauses_.end()) return;
+    const Pause whole = *divided;
+    pauses_.erase(divided);
+    add_if_long({whole.before, transform}, longest);
+    add_if_long({transform, whole.after}, longest);
   }
-  gaps_.erase(
-      std::remove_if(gaps_.begin(), gaps_.end(),
-                     [&](const Gap& gap) { return seconds_between(gap.end, stamp) > kept; }),
-      gaps_.end());
-  if (!newest_.header.stamp.isZero() && seconds_between(newest_.header.stamp, stamp) > longest &&
-      has_moved(newest_, transform)) {
-    gaps_.push_back({newest_.header.stamp, stamp});
+  gaps_.clear();
+  for (const Pause& pause : pauses_) {
+    if (!has_moved(pause.before, pause.after)) continue;
+    gaps_.push_back({pause.before.header.stamp, pause.after.header.stamp});
   }
-  newest_ = transform;
+}
+
+void TransformGaps::add_if_long(const Pause& pause, double longest) {
+  if (seconds_between(pause.before.header.stamp, pause.after.header.stamp) > longest) {
+    pauses_.push_back(pause);
+  }
 }
 
 const TransformGaps::Gap* TransformGaps::find(const ros::Time& instant) const {

@@ -26,8 +26,15 @@ class TransformGaps {
   std::size_t size() const { return gaps_.size(); }
 
  private:
+  struct Pause {
+    geometry_msgs::TransformStamped before, after;
+  };
+
+  void add_if_long(const Pause& pause, double longest);
+
   geometry_msgs::TransformStamped newest_;
-  std::vector<Gap> gaps_;
+  std::vector<Pause> pauses_;  ///< all that are long; a transform that comes late may divide one
+  std::vector<Gap> gaps_;      ///< those in which the frame has moved
 };
 
 }  // namespace ist

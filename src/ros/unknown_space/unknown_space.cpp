@@ -19,8 +19,11 @@ namespace {
 // The robot may move so far [m] until the next look.
 constexpr double kMotion = 0.5;
 constexpr double kShortestPeriod = 0.1;  // [s]
-// The thread looks for at most this share of its time.
+// The thread looks for at most this share of its time, unless what it finds would be too old.
 constexpr double kWorkingShare = 0.25;
+// What is found holds for this share of a memory's decay, or so many seconds if that is more; all
+// space counts as unknown afterwards.
+constexpr double kHolds = 0.5, kHoldsAtLeast = 1.0;
 // One million boxes take 0.5 s and 150 MB. Where there are more, the region becomes smaller.
 constexpr std::size_t kMaxBoxes = 1000000;
 constexpr double kSmaller = 0.8;
@@ -79,7 +82,10 @@ void append_parts(const Eigen::AlignedBox3d& box, const VoxelBoxes& links, doubl
 UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, double range,
                                      const ros::Publisher& publisher)
     : memories_(std::move(memories)), range_(range), publisher_(publisher) {
-  for (const auto& memory : memories_) skin_ = std::max(skin_, memory->skin());
+  for (const auto& memory : memories_) {
+    skin_ = std::max(skin_, memory->skin());
+    longest_ = std::min(longest_, std::max(kHolds * memory->decay(), kHoldsAtLeast));
+  }
   thread_ = std::thread(&UnknownSpaceWatch::run, this);
 }
 
@@ -125,6 +131,13 @@ std::string why_unusable(const UnknownSnapshot& unknown, const RobotModel& robot
   if (!same_geometry(*unknown.robot, robot)) {
     return "all space counts as unknown: the robot is another one since it was seen";
   }
+  if (time.toSec() - unknown.found > unknown.lasts) {
+    return "all space counts as unknown: " +
+           format_text(
+               "what had been seen was found %.2f s ago, and memories forget meanwhile; "
+               "lower ~max_distance or ~memory/max_range, or raise the resolution",
+               time.toSec() - unknown.found);
+  }
   const double ahead = unknown.stamp - time.toSec();
   if (ahead <= kBeganAnew) return "";
   return "all space counts as unknown: " +
@@ -146,12 +159,19 @@ void UnknownSpaceWatch::run() {
     // Without a snapshot nothing counts as seen.
     channel_.back() = std::move(snapshot);
     channel_.publish();
-    wait = std::max(kShortestPeriod, watch.lap() / kWorkingShare);
+    const double took = watch.lap();
+    // The next look takes as long, and what was found has to hold until then.
+    const double left = longest_ - 2.0 * took;
+    wait = std::max(kShortestPeriod, std::min(took / kWorkingShare, left));
+    if (wait > left) part_ *= kSmaller;
+    if (wait < kSmaller * kSmaller * left) part_ = std::min(part_ / kSmaller, 1.0);
   }
 }
 
 std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
   auto snapshot = std::make_shared<UnknownSnapshot>();
+  snapshot->found = ros::Time::now().toSec();
+  snapshot->lasts = longest_;
   KnownSpace all;
   Eigen::AlignedBox3d robot;
   bool any = false;
@@ -169,7 +189,7 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
     all.robot = known.robot;
   }
   if (!any || robot.isEmpty()) return nullptr;
-  double radius = 0.5 * robot.diagonal().norm() + range_ + kMotion;
+  double radius = part_ * (0.5 * robot.diagonal().norm() + range_ + kMotion);
   VoxelBoxes boxes;
   while (!snapshot->seen.unknown_boxes(robot.center(), radius, kMaxBoxes, &boxes)) {
     radius *= kSmaller;

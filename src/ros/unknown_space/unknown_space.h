@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 #include <chrono>
+#include <limits>
 #include <memory>
 #include <string>
 #include <thread>
@@ -26,7 +27,9 @@ struct UnknownSnapshot {
   Eigen::Vector3d center_F = Eigen::Vector3d::Zero();  ///< [m] they fill a sphere about the robot
   double radius = 0.0;                                 ///< [m] of that sphere
   double stamp = 0.0;                                  ///< [s] of the newest cloud in it
-  std::shared_ptr<const RobotModel> robot;             ///< whose own space is known
+  double found = 0.0;  ///< [s] what was measured longer ago than its memory lasts was left out then
+  double lasts = std::numeric_limits<double>::infinity();  ///< [s] that it holds from then on
+  std::shared_ptr<const RobotModel> robot;                 ///< whose own space is known
   SeenSpace seen;
 };
 
@@ -64,6 +67,8 @@ class UnknownSpaceWatch {
   const ros::Publisher publisher_;
   std::chrono::steady_clock::time_point next_publication_;  ///< used by the thread alone
   double skin_ = 0.0;
+  double longest_ = std::numeric_limits<double>::infinity();  ///< [s] that what is found holds
+  double part_ = 1.0;  ///< of the region that is looked at: less where looks take long
   SharedChannel<const UnknownSnapshot> channel_;
   StopSignal stop_;
   std::thread thread_;
