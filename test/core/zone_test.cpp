@@ -163,6 +163,11 @@ TEST(Zone, eachPointIsInTheGroupOfTheFirstZoneThatHoldsIt) {
     const IngestCounts& counts = free.counts;
     EXPECT_EQ(counts.in_zones + counts.used + counts.on_robot,
               whole.counts.used + whole.counts.on_robot);
+    if (one.picture.sensor_moved > 0.0) {
+      PointExtent extent = point_extent(one.config.extent, 0.0, 10.0);
+      extent.allow_for(one.picture.sensor_moved);
+      EXPECT_DOUBLE_EQ(free.extent.radius(1.0), extent.radius(1.0));
+    }
     on_robot += whole.counts.on_robot;
     // The self-filter drops the same.
     for (const Ids* some : {&kept, &groups[0], &groups[1]}) {
