@@ -125,22 +125,11 @@ void ProximityRows::place(const std::vector<double>& q, BodyPoses* poses) {
   kinematics_->place_bodies(joint_poses_, Eigen::Isometry3d::Identity(), poses);
 }
 
-// How far a joint moves, or would have to for what is known of a joint that mimics it.
-double ProximityRows::step_of(std::size_t joint, const std::vector<double>& moved) const {
-  double step = moved[joint];
-  for (const std::size_t j : kinematics_->mimics()) {
-    const Kinematics::Joint& mimic = kinematics_->joints()[j];
-    if (mimic.source != joint || std::isnan(moved[j]) || moved[j] == 0.0) continue;
-    step = std::max(step, moved[j] / std::abs(mimic.multiplier));  // NaN stays NaN
-  }
-  return step;
-}
-
 double ProximityRows::motion(std::size_t row, const std::vector<double>& moved) const {
   double way = 0.0, turned = 0.0;
   const auto& joints = builder_->joints();
   for (std::size_t c = 0; c < joints.size(); ++c) {
-    const double step = step_of(joints[c], moved);
+    const double step = moved[joints[c]];
     const double sweep =
         builder_->rows().sweep(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(c));
     if (!(sweep > 0.0)) continue;

@@ -64,7 +64,6 @@ class ProximityRows {
   void add_links();
   void move(std::size_t link, Eigen::Vector3d* p_R) const;
   void place(const std::vector<double>& q, BodyPoses* poses);
-  double step_of(std::size_t joint, const std::vector<double>& moved) const;
   double motion(std::size_t row, const std::vector<double>& moved) const;
 
   std::shared_ptr<const Kinematics> kinematics_;
