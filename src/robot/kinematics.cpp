@@ -167,8 +167,8 @@ Eigen::Isometry3d Kinematics::joint_pose(std::size_t joint, double q) const {
   return X_PC;
 }
 
-/// Where a joint is stated, or else where the nearest joint of its chain of mimics that is stated
-/// puts it; NaN: none is.
+/// The place at which a joint is stated, or else at which the nearest joint of its chain of mimics
+/// that is stated puts it; NaN: none is.
 double Kinematics::led_position(const std::vector<double>& q, std::size_t joint) const {
   double factor = 1.0, offset = 0.0;
   while (std::isnan(q[joint]) && joints_[joint].leader != joint) {

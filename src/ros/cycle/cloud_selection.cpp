@@ -37,7 +37,7 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       report.counts = snapshot->cloud.counts;
       report.snapshot_memory = snapshot->cloud.index.memory();
       report.ingest_time = snapshot->cloud.ingest_time;
-      // What was missing is so until a snapshot holds it, whatever the report says by now.
+      // An object is missing until a snapshot holds it, whatever the report says by now.
       if (report.incomplete.empty()) report.incomplete = snapshot->incomplete;
       if (!snapshot->has_messages) report.messages = 0;
       if (!snapshot->unplaced.empty() && !report.incomplete.empty()) report.incomplete += "; ";

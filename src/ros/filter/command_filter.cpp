@@ -37,7 +37,7 @@ constexpr std::uint32_t kQueue = 10;
 const ros::WallDuration kZeroPeriod(0.01);
 // [s] For so long, joints that are not commanded any more are given 0 beside others that are.
 constexpr double kHalted = 0.5;
-// Of a simulated clock, whose steps are shorter.
+// Steps of a simulated clock are shorter.
 constexpr std::chrono::milliseconds kClockStands(300);
 // Time in which the last velocity leaves: roscpp sends by another thread, and drops what a
 // publisher has not sent when it goes.

@@ -163,7 +163,7 @@ void JointPoseSource::find_lags(const ros::Time& instant) {
       speed = std::fmax(speed, joints[j].speed);
     } else {
       speed += change * std::max(1.0, share);
-      // What is faster than the joint's limit once, and not before, is a jump of what is stated.
+      // A rate above the joint's limit that it did not have before is a jump of what is stated.
       const double most = std::fmax(joints[j].speed, std::abs(position.velocity));
       if (!(position.rate * position.rate_before > 0.0)) speed = std::fmin(speed, most);
     }

@@ -66,7 +66,7 @@ void TrajectoryWatch::fill(const std::vector<LinkClearance>& found, const std::v
 // @param link  that touches first, as ~proximity counts
 void TrajectoryWatch::fill_contact(std::size_t link, double contact, double now, Message* message) {
   message->state = Message::CONTACT;
-  // What is in the way where the robot is counts at once, also before it begins to move.
+  // An obstacle that the robot touches now counts at once, also before it begins to move.
   const bool is_now = contact <= now;
   message->contact = is_now ? message->header.stamp : trajectory_.instant(contact);
   message->time_to_contact = (message->contact - message->header.stamp).toSec();
