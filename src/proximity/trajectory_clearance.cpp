@@ -33,8 +33,8 @@ struct Advance {
   double tolerance = kFirstTolerance;  // [m]
 };
 
-constexpr double kEnd =
-    1e-9;  // [s] the robot stays at its end for so long; above 1 s, a share of it
+// [s] The robot stays at its end for so long; at a time above 1 s, for this share of the time.
+constexpr double kEnd = 1e-9;
 
 // Stays where a trajectory ends, from `time` on.
 StraightPieces end_of(const StraightPieces& pieces, double time) {

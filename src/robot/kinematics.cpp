@@ -180,11 +180,7 @@ double Kinematics::led_position(const std::vector<double>& q, std::size_t joint)
 }
 
 void Kinematics::place_mimics(std::vector<double>* q) const {
-  for (const std::size_t j : mimics_) {
-    const Mimic& mimic = joints_[j].mimic;
-    double& own = (*q)[j];
-    if (std::isnan(own)) own = mimic.multiplier * (*q)[joints_[j].leader] + mimic.offset;
-  }
+  for (const std::size_t j : mimics_) (*q)[j] = led_position(*q, j);
 }
 
 void Kinematics::place_joints(const std::vector<double>& q, JointPoses* poses) const {

@@ -56,7 +56,7 @@ Rank rank_of(const SourceReport& source, const Vouchers& vouchers, bool has_mode
   return has_model ? Rank::kUnusable : Rank::kRemark;  // no cloud can be used without a model
 }
 
-/// [s] What a known world states counts late where one of its messages is read for longer.
+/// [s] A known world's message that is read for longer is told.
 constexpr double kLongReading = 0.5;
 
 /// The doubt about a source whose obstacles count all the same; empty: none.

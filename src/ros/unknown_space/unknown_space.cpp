@@ -21,8 +21,8 @@ constexpr double kMotion = 0.5;
 constexpr double kShortestPeriod = 0.1;  // [s]
 // The thread looks for at most this share of its time, unless what it finds would be too old.
 constexpr double kWorkingShare = 0.25;
-// What is found holds for this share of a memory's decay, or so many seconds if that is more; all
-// space counts as unknown afterwards.
+// A look holds for this share of a memory's decay, or so many seconds if that is more; all space
+// counts as unknown afterwards.
 constexpr double kHolds = 0.5, kHoldsAtLeast = 1.0;
 // One million boxes take 0.5 s and 150 MB. Where there are more, the region becomes smaller.
 constexpr std::size_t kMaxBoxes = 1000000;
