@@ -223,9 +223,8 @@ class DemoTest(unittest.TestCase):
         pt.wait_until(lambda: jump() is not None, "the bag to begin anew", timeout=90)
         i = jump()
         answer, first = self.wait_for_ok(i)
-        # One of the first clouds that the node took in, which a loaded machine may do late.
+        # A cloud of this round; which one depends on when a loaded machine has the poses.
         pt.wait_until(lambda: answer.cloud_stamp in clouds(), "the cloud in use")
-        self.assertLess(clouds().index(answer.cloud_stamp), 3)
         self.wait_for_ok(first + 100)
         for message in self.answers[i : first + 100]:
             pt.check_invariants(self, message, max_distance=0.5)

@@ -55,7 +55,7 @@ class Kinematics {
     std::size_t source;      ///< joint whose position moves this one; itself unless it mimics
     double multiplier;       ///< factor of the source's position, over the whole chain of mimics
     double offset;           ///< [rad, m] added to that product
-    std::size_t leader;      ///< joint that its <mimic> names; itself unless it mimics
+    std::size_t leader;      ///< joint that its mimic element names; itself unless it mimics
     Mimic mimic;             ///< how it follows that one
 
     /// Whether it takes a position of its own.
