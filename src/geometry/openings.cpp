@@ -17,6 +17,10 @@ namespace {
 
 // The error of a winding number, and some of rounding (TriangleBvh::winding_number).
 constexpr double kWindingError = 0.011;
+// Meshes of so few triangles are summed up in double, with that error: the side of a large sheet is
+// a matter of small differences, and the sum costs less than a microsecond.
+constexpr std::uint32_t kFewTriangles = 16;
+constexpr double kSmallWindingError = 1e-6;
 // Cells of an element, at most; and the radius [m] at which they are small enough.
 constexpr std::size_t kMaxCells = 8192;
 constexpr double kSmallCell = 1e-3;
@@ -67,6 +71,26 @@ double sum_of(const std::vector<Piece>& pieces, const Eigen::Vector3d& center, d
     sum += piece.weight / (kPower == 3 ? distance * distance * distance : distance * distance);
   }
   return sum;
+}
+
+// Of an element at p_L: the sum of solid angles over 4 pi (van Oosterom and Strackee 1983), or what
+// the hierarchy approximates.
+double winding_number(const SolidElement& solid, const Eigen::Vector3d& p_L) {
+  const Eigen::Vector3d p_E = solid.X_EL * p_L;
+  if (solid.bvh.size() > kFewTriangles) return solid.bvh.winding_number(p_E);
+  double sum = 0.0;
+  for (std::uint32_t slot = 0; slot < solid.bvh.size(); ++slot) {
+    const TriangleBvh::Triangle& t = solid.bvh.triangle(slot);
+    const Eigen::Vector3d a = t.a - p_E, b = t.b - p_E, c = t.c - p_E;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    sum += std::atan2(a.dot((t.b - t.a).cross(t.c - t.a)),
+                      la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return sum / (2.0 * kPi);
+}
+
+double winding_error(const SolidElement& solid) {
+  return solid.bvh.size() > kFewTriangles ? kWindingError : kSmallWindingError;
 }
 
 }  // namespace
@@ -172,16 +196,17 @@ struct Openings::Variation {
 Openings::Side Openings::side(std::uint32_t element, const Eigen::Vector3d& center_L,
                               double radius) const {
   const SolidElement& solid = elements_of(solid_)[elements_[element].index];
-  const double winding = solid.bvh.winding_number(solid.X_EL * center_L);
-  if (may_hold_opening(elements_[element], winding, center_L, radius)) {
-    return winding > 0.5 + kWindingError ? Side::kInside : Side::kMayChange;
+  const double winding = winding_number(solid, center_L), error = winding_error(solid);
+  if (may_hold_opening(elements_[element], {winding, error}, center_L, radius)) {
+    return winding > 0.5 + error ? Side::kInside : Side::kMayChange;
   }
   return winding > 0.5 ? Side::kInside : Side::kOutside;
 }
 
-bool Openings::may_hold_opening(const Element& element, double winding,
+bool Openings::may_hold_opening(const Element& element, const Winding& winding,
                                 const Eigen::Vector3d& center_L, double radius) {
-  const double margin = std::abs(winding - std::floor(winding) - 0.5) - kWindingError;
+  const double share = winding.number - std::floor(winding.number);
+  const double margin = std::abs(share - 0.5) - winding.error;
   if (!(margin > 0.0)) return true;
   Variation variation;
   for (const Hole& hole : element.holes) variation.add(hole, center_L, radius);
@@ -205,7 +230,7 @@ void Openings::add_cells(std::uint32_t number, const Eigen::AlignedBox3d& box,
         const Eigen::Vector3d at =
             center + half * Eigen::Vector3d((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1,
                                             (corner & 4) != 0 ? 1 : -1);
-        const double winding = solid.bvh.winding_number(solid.X_EL * at);
+        const Winding winding{winding_number(solid, at), winding_error(solid)};
         if (may_hold_opening(element, winding, at, per_half * half)) smaller.push_back(at);
       }
     }

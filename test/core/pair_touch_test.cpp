@@ -229,6 +229,21 @@ TEST(PairTouch, AKnobInAnOpeningIsAsDeepAsTheWallsAreFar) {
   }
 }
 
+// Next to a floor of two triangles the winding number is a half, less what the floor's edges leave:
+// bounds were metres too low.
+TEST(PairTouch, AFloorOfTwoTrianglesTakesNothingFromTheBound) {
+  for (const double side : {4.0, 50.0}) {
+    Pair pair(test::box({0.1, 0.2, 0.3}), test::sheet(side));
+    for (const double distance : {-0.5, -0.2, -0.03, 0.03, 0.2, 0.5}) {
+      const double half = std::copysign(0.15, distance);
+      pair.X_FL[0] = test::at(0.1 * side, -0.2 * side, distance + half);
+      const PairProximity result = pair.run_fresh();
+      EXPECT_EQ(result.state, LinkState::kNear) << side << " " << distance;
+      EXPECT_NEAR(result.lower_bound, std::abs(distance), 1e-6) << side << " " << distance;
+    }
+  }
+}
+
 // Behind a sheet the winding number is a half, so nobody can tell the side. The spheres bound the
 // distance all the same; minus 0.33 m was what a link of this size has at most as its depth.
 TEST(PairTouch, AnUndecidedOpeningHasTheBoundOfTheSpheres) {

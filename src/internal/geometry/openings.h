@@ -60,7 +60,10 @@ class Openings {
     std::vector<Hole> holes;
   };
   Eigen::AlignedBox3d add_element(std::size_t index, const CancelRequest& cancelled);
-  static bool may_hold_opening(const Element& element, double winding,
+  struct Winding {
+    double number, error;  ///< the winding number at a place
+  };
+  static bool may_hold_opening(const Element& element, const Winding& winding,
                                const Eigen::Vector3d& center_L, double radius);
   void add_cells(std::uint32_t number, const Eigen::AlignedBox3d& box,
                  const CancelRequest& cancelled);
