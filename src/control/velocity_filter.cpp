@@ -117,11 +117,13 @@ struct VelocityFilter::Impl {
   }
 
   // Bounds of velocities by speed and position limits.
-  void bound_joints(Span<const double> q, double horizon) {
+  void bound_joints(Span<const double> q, Span<const double> moved, double horizon) {
     for (Eigen::Index k = 0; k < joints; ++k) {
       const auto j = static_cast<std::size_t>(k);
-      const double down = std::min((limits.lower[j] - q[j]) / horizon, 0.0);
-      const double up = std::max((limits.upper[j] - q[j]) / horizon, 0.0);
+      const double way = moved.empty() ? 0.0 : moved[j];
+      const double lowest = q[j] + std::min(way, 0.0), highest = q[j] + std::max(way, 0.0);
+      const double down = std::min((limits.lower[j] - lowest) / horizon, 0.0);
+      const double up = std::max((limits.upper[j] - highest) / horizon, 0.0);
       lower[k] = std::max(-limits.speed[j], down);
       upper[k] = std::min(limits.speed[j], up);
     }
@@ -225,7 +227,7 @@ struct VelocityFilter::Impl {
   }
 
   void run(Span<const double> command, Span<const double> q, const ConstraintRows& rows,
-           double time_limit) {
+           double time_limit, Span<const double> moved) {
     const Clock::time_point end =
         time_limit > 0.0 && time_limit < 1e6
             ? Clock::now() + std::chrono::duration_cast<Clock::duration>(
@@ -239,9 +241,12 @@ struct VelocityFilter::Impl {
     const auto fault = [&](FilterReason reason) { give(FilterStatus::kFault, reason, 0.0); };
     if (command.size() != count || !is_finite(command)) return fault(FilterReason::kCommand);
     if (q.size() != count || !is_finite(q)) return fault(FilterReason::kPositions);
+    if (!moved.empty() && (moved.size() != count || !is_finite(moved))) {
+      return fault(FilterReason::kPositions);
+    }
     if (!can_be_used(rows, joints)) return fault(FilterReason::kRows);
     target = Eigen::Map<const Eigen::VectorXd>(command.data(), joints);
-    bound_joints(q, rows.horizon);
+    bound_joints(q, moved, rows.horizon);
     const Factors allowed = factors(rows);
     if (allowed.least <= allowed.most) answer.scale = std::max(allowed.most, 0.0);
     if (!bound_accelerations()) return scale(FilterReason::kContradiction);
@@ -277,8 +282,9 @@ VelocityFilter::VelocityFilter(VelocityFilter&&) noexcept = default;
 VelocityFilter& VelocityFilter::operator=(VelocityFilter&&) noexcept = default;
 
 const FilterAnswer& VelocityFilter::run(Span<const double> command, Span<const double> q,
-                                        const ConstraintRows& rows, double time_limit) {
-  impl_->run(command, q, rows, time_limit);
+                                        const ConstraintRows& rows, double time_limit,
+                                        Span<const double> moved) {
+  impl_->run(command, q, rows, time_limit, moved);
   return impl_->answer;
 }
 

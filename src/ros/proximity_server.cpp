@@ -125,6 +125,7 @@ void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Pu
   std::shared_ptr<SourceMemory> memory;
   if (config.memory.enabled) {
     memory = std::make_shared<SourceMemory>(config, config_.unknown_space != UnknownSpace::kFree,
+                                            buffer_,
                                             advertise_map(&private_nh_, "memory/" + config.name));
     memories_.push_back(memory);
   }

@@ -314,6 +314,15 @@ TEST(VelocityFilter, KeepsPositionLimits) {
   // A joint that is beyond its limit may move back, and no farther out.
   EXPECT_EQ(filter.run({0.9, 0.0}, {1.2, 0.0}, rows).velocity[0], 0.0);
   EXPECT_EQ(filter.run({-0.9, 0.0}, {1.2, 0.0}, rows).velocity[0], -0.9);
+  // A joint may have done any part of what it was told, on either side.
+  const std::vector<double> moved = {0.04, -0.04};
+  for (const double sign : {1.0, -1.0}) {
+    const FilterAnswer& told =
+        filter.run({0.9 * sign, 0.9 * sign}, {0.95 * sign, 0.95 * sign}, rows, 0.0, moved);
+    EXPECT_NEAR(told.velocity[0], sign > 0.0 ? 0.1 : -0.5, 1e-12);
+    EXPECT_NEAR(told.velocity[1], sign > 0.0 ? 0.5 : -0.1, 1e-12);
+  }
+  EXPECT_EQ(filter.run({0.1, 0.0}, {0.0, 0.0}, rows, 0.0, {0.1}).reason, FilterReason::kPositions);
 }
 
 TEST(VelocityFilter, LetsAccelerationLimitsGiveWayToRows) {

@@ -126,6 +126,21 @@ class FaultsSensorTest(faults.FaultTest):
                 self.sensor.change = None
                 node.wait_for_status(ProximityArray.OK)
 
+        # One that comes seldom hides the others once at most.
+        seldom = itertools.count(1)
+        self.sensor.change = lambda message: (
+            pt.cloud([[50.0, 0.0, 0.0]], frames[1], message.header.stamp) if next(seldom) % 25 == 0 else None
+        )
+        told = node.wait_for_status(STALE, "by turns in the frames")
+        begin = node.messages.index(told)
+        node.wait_until(lambda: next(seldom) > 100, "others of its clouds")
+        self.sensor.change = None
+        known = [m for m in node.messages[begin:] if m.status == ProximityArray.OK]
+        self.assertGreater(len(known), 5)
+        for message in known:
+            for link in message.links:
+                self.assertEqual(link.state, pt.LinkProximity.NEAR, link.link)
+
 
 if __name__ == "__main__":
     pt.run("faults_sensor_test", FaultsSensorTest)

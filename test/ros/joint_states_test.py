@@ -452,6 +452,42 @@ class JointStatesTest(pt.NodeTest):
         message = node.wait_for_status(ProximityArray.OK)
         self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
 
+    def test_another_axis(self):
+        """After a reload, nothing is placed by where the joints had the links of the robot before."""
+        slide = (
+            '<robot name="slide"><link name="base"/><link name="ball"><collision><geometry>'
+            '<sphere radius="0.1"/></geometry></collision></link><joint name="slide" '
+            'type="prismatic"><parent link="base"/><child link="ball"/><axis xyz="%d 0 0"/>'
+            '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>'
+        )
+        node = self.start(slide % 1, max_distance=3.0)
+        stamps = []
+
+        def state():
+            stamps.append(rospy.Time.now())
+            self.publisher.publish(joint_state({"slide": 0.4}, stamps[-1]))
+
+        robot = self.world.repeat(100, state)
+        points = [[0.4, 0.0, 0.0], [1.6, 0.0, 0.0]]  # the first one on the ball
+        clouds = self.world.start_points(points)
+        node.wait_for(lambda m: m.links and m.links[0].distance > 1.0, "the point on the ball dropped")
+        clouds.stop()
+        robot.paused = True
+        rospy.sleep(0.05)
+        rospy.set_param(self.namespace + "/robot_description", slide % -1)
+        self.assertTrue(node.reload().success)
+        begin = len(node.messages)
+        self.world.cloud_publisher.publish(pt.cloud(points, "base", stamps[-1]))
+        robot.paused = False
+        for message in node.next_messages(30):
+            for link in message.links:  # 0.8 m from the ball's middle
+                known = message.status == ProximityArray.OK
+                self.assertFalse(known and link.lower_bound > 0.7 + 1e-3, link.lower_bound)
+        self.world.start_points(points)
+        node.wait_for(
+            lambda m: m.status == 0 and abs(m.links[0].distance - 0.7) < 1e-3, "0.7 m", start=begin
+        )
+
     def test_faulty_mimic(self):
         """Impossible kinematics are reported, and nothing is known."""
         node = self.start(ARM.replace('mimic joint="slide"', 'mimic joint="silde"'))

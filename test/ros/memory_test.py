@@ -233,6 +233,25 @@ class MemoryTest(pt.NodeTest):
         self.world.poses["base"] = in_odom
         self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered again")
 
+    def test_a_calibration_moves_what_was_seen(self):
+        self.start(memory=dict(LASTING, decay=3.0))
+        self.node.wait_for(self.is_from("cloud"), "the far patch in view")
+        self.world.points = NEAR
+        self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered")
+        self.remember(2)
+        self.world.state_camera(pt.transform((0.0, 0.05, 0.0)))
+        begin = len(self.node.messages)
+        text = "its memory is lost: a static transform to 'camera' is another one now"
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, text)
+        self.world.points = FAR
+        self.node.wait_for(self.is_from("cloud"), "what is lost would be forgotten", start=begin)
+        # Nor is a cloud where it was placed.
+        self.clouds.stop()
+        rospy.sleep(0.15)  # for the last one
+        self.world.state_camera()
+        text = "the static transform from 'camera' to 'base' is another one since the last cloud"
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, text)
+
     # Obstacles that there was no place for are known as long as they are in view, and lost then.
     def test_too_little_memory_is_told(self):
         self.start(memory={"enabled": True, "resolution": 0.005, "max_nodes": 5000})

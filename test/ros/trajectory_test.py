@@ -95,7 +95,7 @@ class TrajectoryTest(pt.NodeTest):
         )
         self.sender = rospy.Publisher(self.node.name + "/trajectory", JointTrajectory, queue_size=1)
         self.world.start_joints(lambda: self.positions(), velocities=self.speeds)
-        self.world.start_points(lambda: self.points)
+        self.clouds = self.world.start_points(lambda: self.points)
         self.node.wait_for_status(0)
         pt.wait_until(lambda: self.sender.get_num_connections() > 0, "the node to listen")
 
@@ -326,6 +326,27 @@ class TrajectoryTest(pt.NodeTest):
         self.assertLessEqual(contact, room / (speed + FAR / DURATION))
         self.assertGreater(contact, room / (speed + FAR / DURATION) - 0.15)
         self.assertAlmostEqual((told.contact - told.brake).to_sec(), 0.25, places=3)
+
+    def test_clouds_stamped_ahead(self):
+        """Obstacles come from when a cloud was received, though its stamp is still ahead."""
+        speed = 0.5
+        self.start(
+            query={"max_distance": 3.0}, trajectory={"obstacle_speed": speed}, cloud_timeout=3.0
+        )
+        self.clouds.stop()
+        received = rospy.Time.now()
+        self.world.cloud_publisher.publish(
+            pt.cloud(self.points, "base", received + rospy.Duration(0.9))
+        )
+        self.send()
+        rospy.sleep(0.8)
+        told = [m for m in self.heard if 0.5 < (m.header.stamp - received).to_sec() < 0.85]
+        self.assertTrue(told)
+        waits, pace = (self.start_time - received).to_sec(), FAR / DURATION
+        touch = (POINT - pt.BALL_RADIUS + pace * waits) / (speed + pace)
+        for message in told:
+            self.assertEqual(message.state, message.CONTACT)
+            self.assertLessEqual((message.contact - received).to_sec(), touch + 0.02)
 
     def test_what_touches_before_it_begins(self):
         self.points = np.array([[0.5 * pt.BALL_RADIUS, 0.0, 0.5]])

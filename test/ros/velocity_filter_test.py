@@ -153,6 +153,8 @@ class VelocityFilterTest(SlidesTest):
             robot = robot.replace('<child link="ball"/>', '<child link="ball"/><mimic joint="along"/>')
         if "limit" in self._testMethodName:
             robot = SLIDES.replace('upper="5" velocity="2"', 'upper="0.6" velocity="2"')
+        if "slid_to" in self._testMethodName:
+            robot = SLIDES.replace('upper="5" velocity="0.4"', 'upper="0.3" velocity="2"')
         if "base" in self._testMethodName:
             robot = robot.replace("</robot>", BASE)
         super().start(
@@ -160,6 +162,7 @@ class VelocityFilterTest(SlidesTest):
             pose_source="joint_states",
             self_filter=has_padding,
             self_filter_padding=PADDING,
+            cloud_timeout=3.0 if "clouds" in self._testMethodName else 0.5,
             **{"self_collision/enabled": has_post},
         )
         self.node.wait_for_status(ProximityArray.OK)
@@ -595,6 +598,41 @@ class VelocityFilterTest(SlidesTest):
         pt.wait_until(lambda: self.q[0] > 0.55, "the ball to come near its limit")
         rospy.sleep(0.5)
         self.assertLess(self.q[0], 0.6 + 0.02)
+
+    def test_a_limit_slid_to_between_seldom_states(self):
+        """A wall across the way pushes the ball along itself, by a joint that is commanded to stand."""
+        along, up = np.meshgrid(np.arange(-1.0, 1.0, 0.02), np.arange(-0.3, 0.3, 0.02))
+        self.world.points = np.column_stack([0.5 + along.ravel(), along.ravel(), up.ravel()])
+        self.seldom = 25
+        seldom = {"joint_timeout": 0.3, "proximity_timeout": 0.5, "approach_time": 1.0}
+        self.start(0.0, 0.0, command_type="std_msgs/Float64MultiArray", **seldom)
+        self.wait_for(FilterState.FREE)
+        for rest in np.linspace(0.02, 0.1, 8):  # where states come counts
+            self.wanted = (0.0, 0.0)
+            rospy.sleep(0.4)
+            with self.lock:
+                self.q = np.array([0.1, 0.3 - rest])
+            rospy.sleep(0.6)
+            self.wanted = (1.5, 0.0)
+            rospy.sleep(0.8)
+            print("slid to its limit: %.1f mm past it" % (1e3 * (self.q[1] - 0.3)))
+            self.assertLess(self.q[1], 0.3 + 0.008)
+
+    def test_clouds_stamped_ahead(self):
+        """Obstacles may have come since the cloud was received, though its stamp is still ahead."""
+        self.robot.function = lambda: self.send_joints(np.zeros(2))
+        self.clouds.stop()
+        near = {"margin": 0.01, "stop_distance": 0.01, "approach_time": 0.02}
+        self.start(0.6, 0.0, obstacle_speed=0.8, **near)
+        received = rospy.Time.now()
+        points = wall() - [0.5, 0.0, 0.0]  # 0.4 m from the ball
+        self.world.cloud_publisher.publish(pt.cloud(points, "base", received + rospy.Duration(0.9)))
+        self.wait_for(FilterState.FREE)
+        rospy.sleep(0.85)
+        after = [s for s in self.filter.states if 0.6 < (s.header.stamp - received).to_sec() < 0.85]
+        self.assertGreater(len(after), 5)
+        for state in after:
+            self.assertLess(state.velocity[0], 1e-3, (state.header.stamp - received).to_sec())
 
     def test_joints_commanded_apart_seldom_stated(self):
         """Each command counts with what the other joint was told to do."""

@@ -38,7 +38,7 @@ enum class FilterReason : std::uint8_t {
   kContradiction = 1,  ///< no velocity meets all bounds and acceleration limits
   kTime = 2,           ///< the time was over
   kCommand = 3,        ///< the command has another size than the joints, or is not finite
-  kPositions = 4,      ///< q has another size than the joints, or is not finite
+  kPositions = 4,      ///< q or `moved` has another size than the joints, or is not finite
   kRows = 5,           ///< the rows are not complete, of another size, or not numbers
 };
 
@@ -94,9 +94,12 @@ class VelocityFilter {
   /// @param q           [rad, m] by joint, now
   /// @param rows        of ConstraintRowBuilder, for the poses at q
   /// @param time_limit  [s] after which the scaled command is given; 0: none
+  /// @param moved       [rad, m] by joint: it is anywhere from q to q + moved, for the position
+  ///                    limits; empty: at q
   /// @returns valid until the next call
   const FilterAnswer& run(Span<const double> command, Span<const double> q,
-                          const ConstraintRows& rows, double time_limit = 0.0);
+                          const ConstraintRows& rows, double time_limit = 0.0,
+                          Span<const double> moved = {});
 
   /// Forgets the last velocity, for acceleration limits: the robot stands.
   void reset();

@@ -16,6 +16,7 @@
 #include "ros/common/publish.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
+#include "ros/output/message_conversion.h"
 
 namespace ist {
 namespace {
@@ -414,7 +415,7 @@ bool CommandFilter::is_twist_proven(const JointCommand& command,
   for (std::size_t i = 0; i < velocity.size(); ++i) {
     command_column_[*column_of(command.joints[i])] = least[static_cast<Eigen::Index>(i)];
   }
-  const FilterAnswer& answer = filter_->run(command_column_, q_column_, rows_, kTimeLimit);
+  const FilterAnswer& answer = filter_->run(command_column_, q_column_, rows_, kTimeLimit, went_);
   for (std::size_t c = 0; c < command_column_.size(); ++c) {
     if (!(std::abs(answer.velocity[c] - command_column_[c]) <= kNegligible)) return false;
   }
@@ -425,8 +426,7 @@ const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::T
   const ist_proximity::ProximityArray& answers = *obstacles_.message;
   history_->at(now, &q_now_);
   RowConfig config = config_.rows;
-  const ros::Time& seen = answers.cloud_stamp.isZero() ? answers.header.stamp : answers.cloud_stamp;
-  config.age = std::max(config.age, seconds_between(seen, now));
+  config.age = std::max(config.age, obstacle_age(answers, now));
   // The robot has gone on since its joints were stated.
   config.horizon += history_->age(now);
   config.approach_time = std::max(config.approach_time, config.horizon);
@@ -442,12 +442,7 @@ const FilterAnswer& CommandFilter::run(const JointCommand& command, const ros::T
   for (std::size_t c = 0; c < q_column_.size(); ++c) q_column_[c] = q_now_[proximity_->joints()[c]];
   hold_others(is_commanded, now);
   take_off_given(now, config_.rows.horizon);
-  // A limit may be as near as if all of it had been done.
-  for (std::size_t c = 0; c < q_column_.size(); ++c) {
-    const double went = went_[static_cast<Eigen::Index>(c)];
-    if (went * command_column_[c] > 0.0) q_column_[c] += went;
-  }
-  return filter_->run(command_column_, q_column_, rows_, kTimeLimit);
+  return filter_->run(command_column_, q_column_, rows_, kTimeLimit, went_);
 }
 
 /// Joints that are not commanded go on as they move now, or as they were told to since the joints
@@ -496,13 +491,13 @@ void CommandFilter::note_given(const FilterState& state, bool replaces_all) {
 void CommandFilter::take_off_given(const ros::Time& now, double horizon) {
   const double age = history_->age(now);
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(rows_.sweep.cols());
-  went_ = moved;
+  went_.assign(static_cast<std::size_t>(moved.size()), 0.0);
   double until = 0.0;  // [s] before now
   for (auto given = given_.rbegin(); given != given_.rend() && until < age; ++given) {
     const double from = std::clamp(seconds_between(given->time, now), until, age);
     const Eigen::Map<const Eigen::VectorXd> velocity(given->velocity.data(), moved.size());
     moved += (from - until) * velocity.cwiseAbs();
-    went_ += (from - until) * velocity;
+    for (std::size_t c = 0; c < went_.size(); ++c) went_[c] += (from - until) * given->velocity[c];
     until = from;
   }
   for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.count); ++i) {

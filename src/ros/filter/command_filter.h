@@ -114,7 +114,9 @@ class CommandFilter {
     std::vector<double> velocity;  ///< [rad/s, m/s] by column
   };
   std::deque<Given> given_;  ///< of the time that joint states may be old
-  Eigen::VectorXd went_;     ///< [rad, m] by column: what that was since the joints were stated
+  /// [rad, m] By column: what that was since the joints were stated, of which a robot that lags may
+  /// have done less.
+  std::vector<double> went_;
 
   ros::Publisher safe_command_, state_, scale_, markers_;
   ros::Subscriber command_, answers_, self_answers_, joints_, node_scale_;

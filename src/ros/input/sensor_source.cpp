@@ -20,6 +20,8 @@ namespace {
 
 // Clouds of one stream may overtake each other; stamps that go back farther are a new start. [s]
 constexpr double kMaxDisorder = 1.0;
+// [s] For so long the frames of a topic are remembered at most.
+constexpr double kFrameMemory = 10.0;
 // Characters of a frame's name, which every status that mentions it repeats.
 constexpr std::size_t kMaxFrameName = 256;
 const ros::WallDuration kPollIdle(0.05), kPollTaken(0.005), kPollTf(0.0005);
@@ -123,8 +125,11 @@ void SensorSource::receive(Measurement measurement) {
   has_received_ = true;
   take_target();
   const ros::Time stamp = measurement.header.stamp;
-  std::string problem = check(measurement);
-  if (problem.empty() && !is_map_) problem = note_frame(without_slash(measurement.header.frame_id));
+  std::string problem = check(measurement), alternation;
+  if (problem.empty() && !is_map_) {
+    problem = alternation = note_frame(without_slash(measurement.header.frame_id));
+  }
+  if (!alternation.empty()) waiting_.clear();
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
   if (is_believed) tell_skew(ahead);
@@ -141,6 +146,7 @@ void SensorSource::receive(Measurement measurement) {
   update([&](SourceReport* report) {
     ++report->messages;
     report->has_been_there = true;
+    if (!alternation.empty()) report->alternation = alternation;
     if (is_believed) {
       report->newest = std::fmax(report->newest, stamp.toSec() - std::fmax(ahead, 0.0));
       report->ahead = ahead;
@@ -207,16 +213,20 @@ std::string SensorSource::check(const Measurement& measurement) const {
 }
 
 /// Each cloud takes the place of the one before, so that of several sensors only one would be seen
-/// at a time. A sensor that gets another frame keeps it for longer than the timeout, or 10 s.
-/// @returns empty, or why the messages of now cannot be used
+/// at a time. A sensor that gets another frame keeps it for longer than the timeout, or 10 s; once
+/// frames have come by turns, for those 10 s.
+/// @returns empty, or why the messages of now, and the one in use, cannot be used
 std::string SensorSource::note_frame(const std::string& frame) {
   const ros::Time now = ros::Time::now();
-  const double longest = std::min(config_.timeout, 10.0);  // the timeout may be infinite
+  const double longest = std::min(config_.timeout, kFrameMemory);  // the timeout may be infinite
   if (frame != frame_) {
     frame_before_ = std::exchange(frame_, frame);
     frames_left_[frame_before_] = now;
+    const bool has_alternated =
+        std::abs(seconds_between(frames_alternate_until_, now)) < kFrameMemory;
+    const double memory = has_alternated ? kFrameMemory : longest;
     for (auto left = frames_left_.begin(); left != frames_left_.end();) {
-      const bool is_over = !(std::abs(seconds_between(left->second, now)) < longest);
+      const bool is_over = !(std::abs(seconds_between(left->second, now)) < memory);
       left = is_over ? frames_left_.erase(left) : std::next(left);
     }
     if (frames_left_.count(frame) > 0) frames_alternate_until_ = now + ros::Duration(longest);
@@ -291,9 +301,11 @@ void SensorSource::use_map() {
 /// @returns empty on success, else a sentence
 std::string SensorSource::use(const Measurement& measurement) {
   Placement placement;
+  const std::uint64_t static_changes = buffer_.static_changes();
   std::string problem = find_poses(measurement, &placement);
   if (!problem.empty()) return problem;
   SourceSnapshot& snapshot = exchange_.writable();
+  snapshot.static_changes = static_changes;
   const bool is_shown = !is_map_ && filtered_.getNumSubscribers() > 0;
   take_in(measurement, placement, is_shown, &snapshot);
   note_view(placement, snapshot.cloud.view);
@@ -304,11 +316,11 @@ std::string SensorSource::use(const Measurement& measurement) {
 /// A self-filter by view corrects the sensor's pose by what it has seen before: in another frame,
 /// or since a sensor was calibrated, that pose is right or wrong in another way.
 void SensorSource::begin_view(const std::string& frame) {
-  const std::uint64_t changes = buffer_.static_changes();
-  if (frame == view_frame_ && changes == static_changes_) return;
+  const bool is_same =
+      frame == view_frame_ && !buffer_.has_static_change(target_.fixed_frame, frame, view_changes_);
   view_frame_ = frame;
-  static_changes_ = changes;
-  if (config_.ingest.self_filter_mode != SelfFilterMode::kView) return;
+  view_changes_ = buffer_.static_changes();
+  if (is_same || config_.ingest.self_filter_mode != SelfFilterMode::kView) return;
   ingest_ = Ingest(ingest_config(config_));
 }
 
@@ -367,6 +379,7 @@ void SensorSource::publish(const SourceSnapshot& snapshot, bool is_shown) {
     ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': warm-up failed: " << fault);
   }
   update([&](SourceReport* report) {
+    report->alternation.clear();
     report->shown += is_shown ? 1 : 0;
     report->warm_up_time = took;
   });

@@ -94,7 +94,7 @@ class SensorSource : public Source {
   std::uint64_t content_ = 0;         ///< Measurement::content of the newest message
   std::string frame_, frame_before_;  ///< of the newest message, and another one before it
   std::string view_frame_;            ///< of the clouds that ingest_ has seen,
-  std::uint64_t static_changes_ = 0;  ///< while so many static transforms had changed
+  std::uint64_t view_changes_ = 0;    ///< while so many static transforms had changed
   std::map<std::string, ros::Time> frames_left_;  ///< when another one took a frame's place
   ros::Time frames_alternate_until_;
   std::chrono::steady_clock::time_point target_since_;  ///< with this model and generation

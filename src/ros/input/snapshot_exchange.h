@@ -27,6 +27,7 @@ struct SourceSnapshot {
   std::vector<bool> filtered;
   std::uint64_t generation = 0;        ///< see SourceTarget
   std::string fixed_frame, map_frame;  ///< the frames between which the cloud or map is placed
+  std::uint64_t static_changes = 0;    ///< TransformBuffer::static_changes() when it was placed
   /// The map's boxes -> `map_frame`.
   Eigen::Isometry3d X_BM = Eigen::Isometry3d::Identity();
   /// The lags of the frames of a map or of known objects whose poses are late.

@@ -174,7 +174,7 @@ std::string Source::place(const SnapshotRequest& request, const SourceSnapshot& 
                           SourceSnapshot* placed) const {
   std::string problem = ended_zone(original, ros::Time::now());
   if (!problem.empty()) return problem;
-  if (!is_placed_when_asked_) return buffer_.dispute(original.fixed_frame, original.map_frame);
+  if (!is_placed_when_asked_) return why_misplaced(original);
   std::vector<Eigen::Isometry3d>& X_FB = placed->world.X_FB;
   placed->lags.resize(X_FB.size() + (original.cloud.boxes ? 1 : 0));
   placed->is_placed.resize(X_FB.size(), true);
@@ -207,6 +207,15 @@ std::string Source::place(const SnapshotRequest& request, const SourceSnapshot& 
       placed->cloud.boxes || (placed->surfaces && !placed->world.world->objects().empty());
   placed->unplaced = has_rest && !problem.empty() ? "some of it is left out: " + problem : "";
   return has_rest ? "" : problem;
+}
+
+/// Says why a cloud is not where it was placed; empty: it still is.
+std::string Source::why_misplaced(const SourceSnapshot& cloud) const {
+  if (buffer_.has_static_change(cloud.fixed_frame, cloud.map_frame, cloud.static_changes)) {
+    return "the static transform from '" + cloud.map_frame + "' to '" + cloud.fixed_frame +
+           "' is another one since the last " + noun(config_.type);
+  }
+  return buffer_.dispute(cloud.fixed_frame, cloud.map_frame);
 }
 
 /// The first doubt about where the frames of a snapshot are; empty: none.

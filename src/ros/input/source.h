@@ -142,6 +142,7 @@ class Source : public ObstacleSource {
  private:
   std::string place(const SnapshotRequest& request, const SourceSnapshot& original,
                     SourceSnapshot* placed) const;
+  std::string why_misplaced(const SourceSnapshot& cloud) const;
   std::string doubt_of_place(const SourceSnapshot& snapshot) const;
   bool is_current(const SourceSnapshot* snapshot, const std::shared_ptr<const RobotModel>& model);
   void notice_clock_jump();

@@ -45,8 +45,9 @@ bool is_there(const std::string& path) {
 }  // namespace
 
 SourceMemory::SourceMemory(const SourceConfig& config, bool wants_body,
-                           const ros::Publisher& publisher)
+                           const TransformBuffer& buffer, const ros::Publisher& publisher)
     : config_(config),
+      buffer_(buffer),
       wants_body_(wants_body),
       publisher_(publisher),
       map_(map_config(config)),
@@ -59,6 +60,7 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
   Stopwatch watch;
   begin_target(target);
   const std::lock_guard<std::mutex> lock(mutex_);
+  note_calibration(cloud);
   cloud_stamp_ = cloud.stamp;
   counts_from_ = cloud.counts_from;
   note_extent(extent_of_voxels(cloud.cloud.extent, map_.config().max_range), cloud.cloud.stamp);
@@ -113,14 +115,25 @@ void SourceMemory::begin_target(const SourceTarget& target) {
 }
 
 void SourceMemory::change_frame(const std::string& before) {
-  if (map_.has_obstacles()) {
-    note_loss("its memory is lost: it was in the frame '" + before + "', and is in '" +
-              fixed_frame_ + "' now");
-  }
-  map_.clear();
-  region_since_ = kNever;
+  lose_all("it was in the frame '" + before + "', and is in '" + fixed_frame_ + "' now");
   forget_body();
   read_file();
+}
+
+void SourceMemory::lose_all(const std::string& reason) {
+  if (map_.has_obstacles()) note_loss("its memory is lost: " + reason);
+  map_.clear();
+  region_since_ = kNever;
+}
+
+/// What a sensor has shown is elsewhere once it is calibrated anew.
+void SourceMemory::note_calibration(const SourceSnapshot& cloud) {
+  const bool is_other =
+      cloud.map_frame == sensor_frame_ &&
+      buffer_.has_static_change(cloud.fixed_frame, cloud.map_frame, static_changes_);
+  sensor_frame_ = cloud.map_frame;
+  static_changes_ = cloud.static_changes;
+  if (is_other) lose_all("a static transform to '" + sensor_frame_ + "' is another one now");
 }
 
 /// Obstacles stay where they were seen, and get no older by it. Where so much time is missing that

@@ -34,7 +34,9 @@ class SourceMemory : public ObstacleSource {
  public:
   /// @param config     its memory is enabled
   /// @param wants_body  whether the space that the robot takes up has to be known (~unknown_space)
-  SourceMemory(const SourceConfig& config, bool wants_body, const ros::Publisher& publisher);
+  /// @param buffer      outlives this
+  SourceMemory(const SourceConfig& config, bool wants_body, const TransformBuffer& buffer,
+               const ros::Publisher& publisher);
 
   bool is_memory() const override { return true; }
 
@@ -94,6 +96,8 @@ class SourceMemory : public ObstacleSource {
   std::string insert(const Measurement& measurement, const Placement& placement,
                      const SourceTarget& target, const SourceSnapshot& cloud);
   void change_frame(const std::string& before);
+  void lose_all(const std::string& reason);
+  void note_calibration(const SourceSnapshot& cloud);
   void set_back(double step);
   void read_file();
   void note_loss(const std::string& text);
@@ -112,6 +116,7 @@ class SourceMemory : public ObstacleSource {
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
 
   const SourceConfig config_;
+  const TransformBuffer& buffer_;
   const bool wants_body_;
   ros::Publisher publisher_;
 
@@ -120,6 +125,8 @@ class SourceMemory : public ObstacleSource {
   std::uint64_t generation_ = 0;
   double set_back_ = 0.0;  ///< [s] SourceTarget::set_back
   std::string fixed_frame_;
+  std::string sensor_frame_;          ///< of the last cloud,
+  std::uint64_t static_changes_ = 0;  ///< which was placed after so many static changes
   std::shared_ptr<const RobotModel> robot_;
   RegionOfInterest region_;  ///< in which all is remembered that has been seen
   RegionOfInterest newest_region_;

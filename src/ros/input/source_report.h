@@ -64,6 +64,7 @@ struct SourceReport {
   double last_work = 0.0;       ///< [s] what reading and ingesting the last message took
   double warm_up_time = 0.0;    ///< [s] what its first answer took; 0: there was no warm-up
   std::string problem;          ///< why the last message is not in use (yet); empty when it is
+  std::string alternation;      ///< why messages hide what others show; empty: they do not
   std::string doubt;            ///< about messages that are used all the same; empty: none
   std::string doubt_of_sender;  ///< that it is gone, and what it told is held; empty: none
   std::string doubt_of_place;   ///< about where its frame is, or doubt_of_sender; empty: none

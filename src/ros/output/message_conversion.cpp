@@ -126,6 +126,19 @@ bool is_incomplete(const ProximityArray& message) {
          message.status == ProximityArray::STALE_CLOUD || message.status == ProximityArray::LOADING;
 }
 
+double obstacle_age(const ProximityArray& message, const ros::Time& now) {
+  const ros::Time& header = message.header.stamp;
+  const ros::Time& oldest = message.cloud_stamp.isZero() ? header : message.cloud_stamp;
+  double age = seconds_between(oldest, header);
+  for (const ist_proximity::SourceStatus& source : message.sources) {
+    // What stands still is not in cloud_stamp, and may be any time older.
+    if (source.status == ProximityArray::OK && source.stamp >= oldest) {
+      age = std::max(age, source.age);  // NaN of a file, which is left out
+    }
+  }
+  return age + seconds_between(header, now);
+}
+
 double min_distance(const ProximityArray& message, const std::vector<bool>& counts) {
   if (is_incomplete(message)) return kNaN;
   bool any = false;

@@ -54,6 +54,10 @@ void assign_source(const SourceReport& source, const ros::Time& stamp,
 /// or that the robot's model is not complete yet.
 bool is_incomplete(const ist_proximity::ProximityArray& message);
 
+/// [s] For how long the obstacles of a message may have moved: since its oldest cloud was measured,
+/// or received where its stamp was ahead of the clock.
+double obstacle_age(const ist_proximity::ProximityArray& message, const ros::Time& now);
+
 /// Gives the smallest lower bound [m] of the links that count; NaN when one of them is UNKNOWN,
 /// when none counts, and where is_incomplete(). All CLEAR gives ~max_distance.
 /// @param counts  by link of the message; another length: every link counts

@@ -27,6 +27,18 @@ constexpr double kMaxSpacing = 1.0;  // [s] after a longer pause, the usual spac
 constexpr std::size_t kMaxWaiting = 10;
 constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 
+// Whether the same positions put the same links to the same places.
+bool is_same_motion(const Kinematics& a, const Kinematics& b) {
+  const auto is_same = [](const Kinematics::Joint& one, const Kinematics::Joint& other) {
+    return one.name == other.name && one.type == other.type && one.parent == other.parent &&
+           one.X_PJ.matrix() == other.X_PJ.matrix() && one.axis == other.axis &&
+           one.leader == other.leader && one.mimic.multiplier == other.mimic.multiplier &&
+           one.mimic.offset == other.mimic.offset;
+  };
+  return a.bodies() == b.bodies() && std::equal(a.joints().begin(), a.joints().end(),
+                                                b.joints().begin(), b.joints().end(), is_same);
+}
+
 }  // namespace
 
 JointStateListener::JointStateListener(TransformBuffer* buffer, ros::NodeHandle nh,
@@ -48,7 +60,10 @@ JointStateListener::JointStateListener(TransformBuffer* buffer, ros::NodeHandle 
 void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinematics) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (kinematics == kinematics_) return;
+  // Nothing is placed by what the joints of another robot were.
+  const bool is_other = kinematics_ && kinematics && !is_same_motion(*kinematics_, *kinematics);
   kinematics_ = std::move(kinematics);
+  if (is_other) buffer_.clear();
   buffer_.withdraw(urdf_);
   index_.clear();
   led_by_.clear();

@@ -89,6 +89,7 @@ void TransformBuffer::forget_moving() {
     gaps_ -= record.gaps.size();
     record.statements.forget_moving();
     kept.newest_static = record.newest_static;
+    kept.static_change = record.static_change;
     kept.is_static_in_tf = record.is_static_in_tf;
     kept.frozen = record.frozen;
     if (kept.refusal.empty() && record.statements.empty() && !kept.is_static_in_tf) {
@@ -191,6 +192,11 @@ void TransformBuffer::note_gap(const geometry_msgs::TransformStamped& transform,
   gaps_ += record->gaps.size();
 }
 
+/// The caller holds mutex_.
+void TransformBuffer::note_static_change(Record* record) {
+  record->static_change = ++static_changes_;
+}
+
 /// Notes whether tf2 has a frame without time, and whether it moves all the same. The caller holds
 /// mutex_.
 void TransformBuffer::note_turn(const geometry_msgs::TransformStamped& transform,
@@ -200,7 +206,7 @@ void TransformBuffer::note_turn(const geometry_msgs::TransformStamped& transform
     geometry_msgs::TransformStamped& newest = record->newest_static;
     const bool is_same = newest.transform == transform.transform &&
                          newest.header.frame_id == transform.header.frame_id;
-    if (!newest.child_frame_id.empty() && !is_same) ++static_changes_;
+    if (!newest.child_frame_id.empty() && !is_same) note_static_change(record);
     newest = transform;
     record->is_static_in_tf = record->is_static_in_tf || record->newest.isZero();
     if (!record->frozen.empty()) --disputes_;
@@ -257,7 +263,7 @@ void TransformBuffer::change_statements(const Change& change, Record* record) {
   --disputes_;
   for (const auto& left : statements.statics()) {
     setTransform(left, "", true);
-    ++static_changes_;
+    note_static_change(record);
   }
 }
 
@@ -372,6 +378,15 @@ std::string TransformBuffer::dispute(const std::string& fixed, const std::string
     if (!record->frozen.empty()) return record->frozen;
   }
   return "";
+}
+
+bool TransformBuffer::has_static_change(const std::string& fixed, const std::string& frame,
+                                        std::uint64_t since) const {
+  if (static_changes_ == since) return false;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::vector<const Record*> way = between(fixed, frame);
+  return std::any_of(way.begin(), way.end(),
+                     [since](const Record* record) { return record->static_change > since; });
 }
 
 std::string TransformBuffer::gap(const std::string& fixed, const std::string& frame,

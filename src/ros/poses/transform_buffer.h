@@ -88,6 +88,10 @@ class TransformBuffer : public tf2::BufferCore {
   /// Counts the static transforms that have been replaced by others: what stands there was moved,
   /// or was somewhere else all the time.
   std::uint64_t static_changes() const { return static_changes_; }
+  /// Whether one between two frames is among those since static_changes() was `since`. It costs
+  /// nothing when there is none.
+  bool has_static_change(const std::string& fixed, const std::string& frame,
+                         std::uint64_t since) const;
 
   /// Says that two publishers state a transform between two frames differently, and since when;
   /// empty where none is in dispute. It costs nothing while there is no dispute at all.
@@ -120,8 +124,9 @@ class TransformBuffer : public tf2::BufferCore {
     FrameStatements statements;
     TransformGaps gaps;
     geometry_msgs::TransformStamped newest_static;
-    bool is_static_in_tf = false;  ///< tf2 has it without time, whatever comes later
-    std::string frozen;            ///< a sentence: it moves all the same; empty: it does not
+    std::uint64_t static_change = 0;  ///< number of its last one; 0: it has had none
+    bool is_static_in_tf = false;     ///< tf2 has it without time, whatever comes later
+    std::string frozen;               ///< a sentence: it moves all the same; empty: it does not
 
     bool is_refused_for_good() const { return refused_until == Clock::time_point::max(); }
   };
@@ -138,6 +143,7 @@ class TransformBuffer : public tf2::BufferCore {
   template <typename Change>
   void change_statements(const Change& change, Record* record);
   void note_gap(const geometry_msgs::TransformStamped& transform, Record* record);
+  void note_static_change(Record* record);
   void note_turn(const geometry_msgs::TransformStamped& transform,
                  const TransformPublisher& publisher, bool is_static, Record* record);
   Record* find_or_make(const std::string& child);
@@ -155,7 +161,7 @@ class TransformBuffer : public tf2::BufferCore {
   bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
   std::atomic<std::size_t> disputes_{0};  ///< records with a dispute, and those that are frozen
   std::atomic<std::size_t> gaps_{0};      ///< of all records
-  std::atomic<std::uint64_t> static_changes_{0};
+  std::atomic<std::uint64_t> static_changes_{0};  ///< of all records
   ros::Time last_now_;
   std::set<std::string> ignored_;
 

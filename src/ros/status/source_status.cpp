@@ -153,6 +153,7 @@ Status source_status(const SourceReport& source, double now) {
   if (std::isnan(source.newest)) {  // all stamps are 0 or far in the future
     return stale_cloud(source, because(source.problem));
   }
+  if (!source.alternation.empty()) return stale_cloud(source, because(source.alternation));
   const double newest_age = now - source.newest;
   if (newest_age > source.timeout) return stale(source, newest_age);
   if (!source.has_snapshot) {

@@ -12,6 +12,7 @@
 #include "ros/common/stopwatch.h"
 #include "ros/common/text.h"
 #include "ros/model/counted_links.h"
+#include "ros/output/message_conversion.h"
 
 namespace ist {
 namespace {
@@ -205,8 +206,7 @@ void TrajectoryWatch::look(const ros::Time& now, Message* message) {
 // [s] For how long obstacles may have come nearer than they were measured when the robot is where
 // the trajectory has it at `time`, now or once it begins: also while braking delays the robot.
 double TrajectoryWatch::obstacle_age(const ros::Time& now, double time) const {
-  const ros::Time measured = here_.cloud_stamp.isZero() ? now : here_.cloud_stamp;
-  const double age = std::max((std::max(now, trajectory_.start) - measured).toSec(), 0.0);
+  const double age = std::max(ist::obstacle_age(here_, std::max(now, trajectory_.start)), 0.0);
   const double way = config_.deceleration.is_stated()
                          ? braking_way(trajectory_.pieces, time, trajectory_.end(),
                                        config_.deceleration.of(*model_->kinematics))
