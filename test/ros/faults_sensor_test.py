@@ -126,20 +126,29 @@ class FaultsSensorTest(faults.FaultTest):
                 self.sensor.change = None
                 node.wait_for_status(ProximityArray.OK)
 
-        # One that comes seldom hides the others once at most.
-        seldom = itertools.count(1)
-        self.sensor.change = lambda message: (
-            pt.cloud([[50.0, 0.0, 0.0]], frames[1], message.header.stamp) if next(seldom) % 25 == 0 else None
-        )
-        told = node.wait_for_status(STALE, "by turns in the frames")
-        begin = node.messages.index(told)
-        node.wait_until(lambda: next(seldom) > 100, "others of its clouds")
+    def test_another_sensor_that_comes_seldom(self):
+        """It hides what the first one sees once at most, and until that one comes again."""
+        self.world.poses["other_camera"] = ("base", np.eye(4))
+        node = self.start()
+        count = itertools.count(1)
+        seldom = []
+
+        def at_times(message):
+            if next(count) % 25 > 0:
+                return None
+            seldom.append(message.header.stamp)
+            return seen_from(np.eye(4), "other_camera", message)
+
+        begin = len(node.messages)
+        self.sensor.change = at_times
+        node.wait_until(lambda: len(seldom) > 4, "clouds of the other one")
         self.sensor.change = None
         known = [m for m in node.messages[begin:] if m.status == ProximityArray.OK]
-        self.assertGreater(len(known), 5)
-        for message in known:
-            for link in message.links:
-                self.assertEqual(link.state, pt.LinkProximity.NEAR, link.link)
+        self.assertGreater(len(known), 50)
+        by_other = [m for m in known if m.cloud_stamp in seldom]
+        self.assertEqual({m.cloud_stamp for m in by_other} - set(seldom[:1]), set())
+        for message in by_other:
+            self.assertLess((message.header.stamp - seldom[0]).to_sec(), 0.6 * CLOUD_TIMEOUT)
 
 
 if __name__ == "__main__":

@@ -472,13 +472,16 @@ class JointStatesTest(pt.NodeTest):
         clouds = self.world.start_points(points)
         node.wait_for(lambda m: m.links and m.links[0].distance > 1.0, "the point on the ball dropped")
         clouds.stop()
+        rospy.sleep(0.1)  # the next cloud is later than all of these
         robot.paused = True
         rospy.sleep(0.05)
         rospy.set_param(self.namespace + "/robot_description", slide % -1)
         self.assertTrue(node.reload().success)
         begin = len(node.messages)
-        self.world.cloud_publisher.publish(pt.cloud(points, "base", stamps[-1]))
+        before = stamps[-1]
         robot.paused = False
+        node.wait_for_status(ProximityArray.NO_CLOUD, start=begin)
+        self.world.cloud_publisher.publish(pt.cloud(points, "base", before))
         for message in node.next_messages(30):
             for link in message.links:  # 0.8 m from the ball's middle
                 known = message.status == ProximityArray.OK

@@ -348,6 +348,25 @@ class FreshWorldTest(pt.NodeTest):
         sender.paused = True
         node.wait_for_unknown(ProximityArray.STALE_CLOUD, "allowed is 1.00 s")
 
+    def test_a_frame_that_turns_far_while_it_is_late(self):
+        """Nothing is known of the way to what stands in it, and no bound says otherwise."""
+        self.world.stand()
+        self.world.start_tf()
+
+        def turn():
+            stamp = rospy.Time.now() - rospy.Duration(0.35)
+            X_BT = pt.transform((0.3, 0, 0), angle=2.0 * (stamp.to_sec() % 1000))
+            self.world.publish_transforms([pt.transform_message("base", "table", X_BT, stamp)])
+
+        self.world.repeat(50, turn)
+        far = {"shape": "box", "size": [0.3] * 3, "frame_id": "table", "position": [5.0, 0.0, 0.0]}
+        node = self.start(sources={"cell": {"type": "world", "objects": {"far": far}}}, max_distance=1.0)
+        is_unknown = lambda link: link.state == LinkProximity.UNKNOWN  # noqa: E731
+        node.wait_for(
+            lambda m: m.status == ProximityArray.DEGRADED and any(map(is_unknown, m.links)), "a turn"
+        )
+        # Each message keeps that no bound is finite.
+
 
 class OtherRobotTest(pt.NodeTest):
     """Another robot, by its joint states and by tf."""

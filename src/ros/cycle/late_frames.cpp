@@ -58,8 +58,9 @@ void LateFrames::lower(double max_distance, std::vector<LinkProximity>* answers)
     answer.lower_bound -= off;
     if (answer.state == LinkState::kClear) {
       // range() falls short of it only where a frame turns more than kMostTurned.
-      if (answer.lower_bound < max_distance * (1.0 - 1e-12)) answer.reset();
-      answer.lower_bound = std::max(answer.lower_bound, max_distance);
+      const bool is_clear = answer.lower_bound >= max_distance * (1.0 - 1e-12);
+      if (is_clear) answer.lower_bound = std::max(answer.lower_bound, max_distance);
+      if (!is_clear) answer.reset();
     } else {
       answer.sensor_width += off;
     }
