@@ -60,10 +60,12 @@ JointStateListener::JointStateListener(TransformBuffer* buffer, ros::NodeHandle 
 void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinematics) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (kinematics == kinematics_) return;
-  // Nothing is placed by what the joints of another robot were.
-  const bool is_other = kinematics_ && kinematics && !is_same_motion(*kinematics_, *kinematics);
   kinematics_ = std::move(kinematics);
-  if (is_other) buffer_.clear();
+  if (kinematics_) {
+    // Nothing is placed by what the joints of another robot were.
+    if (in_tf_ && !is_same_motion(*in_tf_, *kinematics_)) buffer_.clear();
+    in_tf_ = kinematics_;
+  }
   buffer_.withdraw(urdf_);
   index_.clear();
   led_by_.clear();

@@ -143,6 +143,7 @@ class JointStateListener {
 
   std::mutex mutex_;  // guards the members below; held for copies and one message only
   std::shared_ptr<const Kinematics> kinematics_;
+  std::shared_ptr<const Kinematics> in_tf_;  ///< that put joints into tf last; null: none has
   std::unordered_map<std::string, std::size_t> index_;  ///< index of a joint by its name
   std::vector<std::vector<std::size_t>> led_by_;        ///< by joint: the joints that mimic it
   JointPositions newest_, taken_;
