@@ -234,7 +234,7 @@ class MemoryTest(pt.NodeTest):
         self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered again")
 
     def test_a_calibration_moves_what_was_seen(self):
-        self.start(memory=dict(LASTING, decay=3.0))
+        self.start(memory=dict(LASTING, decay=3.0), cloud_timeout=2.0)
         self.node.wait_for(self.is_from("cloud"), "the far patch in view")
         self.world.points = NEAR
         self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered")
