@@ -73,8 +73,8 @@ double sum_of(const std::vector<Piece>& pieces, const Eigen::Vector3d& center, d
   return sum;
 }
 
-// Of an element at p_L: the sum of solid angles over 4 pi (van Oosterom and Strackee 1983), or what
-// the hierarchy approximates.
+// Returns that of an element at p_L: the sum of solid angles over 4 pi (van Oosterom and Strackee
+// 1983), or what the hierarchy approximates.
 double winding_number(const SolidElement& solid, const Eigen::Vector3d& p_L) {
   const Eigen::Vector3d p_E = solid.X_EL * p_L;
   if (solid.bvh.size() > kFewTriangles) return solid.bvh.winding_number(p_E);

@@ -126,7 +126,7 @@ void SourceMemory::lose_all(const std::string& reason) {
   region_since_ = kNever;
 }
 
-/// What a sensor has shown is elsewhere once it is calibrated anew.
+/// A sensor that is calibrated anew has shown its obstacles in other places.
 void SourceMemory::note_calibration(const SourceSnapshot& cloud) {
   const bool is_other =
       cloud.map_frame == sensor_frame_ &&

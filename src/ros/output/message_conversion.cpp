@@ -131,7 +131,7 @@ double obstacle_age(const ProximityArray& message, const ros::Time& now) {
   const ros::Time& oldest = message.cloud_stamp.isZero() ? header : message.cloud_stamp;
   double age = seconds_between(oldest, header);
   for (const ist_proximity::SourceStatus& source : message.sources) {
-    // What stands still is not in cloud_stamp, and may be any time older.
+    // Sources that stand still are not in cloud_stamp, and may be any time older.
     if (source.status == ProximityArray::OK && source.stamp >= oldest) {
       age = std::max(age, source.age);  // NaN of a file, which is left out
     }
