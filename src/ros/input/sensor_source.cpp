@@ -125,11 +125,8 @@ void SensorSource::receive(Measurement measurement) {
   has_received_ = true;
   take_target();
   const ros::Time stamp = measurement.header.stamp;
-  std::string problem = check(measurement), alternation;
-  if (problem.empty() && !is_map_) {
-    problem = alternation = note_frame(without_slash(measurement.header.frame_id));
-  }
-  if (!alternation.empty()) waiting_.clear();
+  std::string problem = check(measurement);
+  if (problem.empty() && !is_map_) problem = note_frame(without_slash(measurement.header.frame_id));
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
   if (is_believed) tell_skew(ahead);
@@ -146,7 +143,6 @@ void SensorSource::receive(Measurement measurement) {
   update([&](SourceReport* report) {
     ++report->messages;
     report->has_been_there = true;
-    if (!alternation.empty()) report->alternation = alternation;
     if (is_believed) {
       report->newest = std::fmax(report->newest, stamp.toSec() - std::fmax(ahead, 0.0));
       report->ahead = ahead;
@@ -234,9 +230,13 @@ std::string SensorSource::note_frame(const std::string& frame) {
   // The clock may have gone back.
   const double left = seconds_between(now, frames_alternate_until_);
   if (!(left > 0.0 && left <= longest)) return "";
-  return "its " + noun_ + "s come by turns in the frames '" + std::min(frame_, frame_before_) +
-         "' and '" + std::max(frame_, frame_before_) +
-         "', so that one would hide the other: give each sensor a topic and a source of its own";
+  std::string problem =
+      "its " + noun_ + "s come by turns in the frames '" + std::min(frame_, frame_before_) +
+      "' and '" + std::max(frame_, frame_before_) +
+      "', so that one would hide the other: give each sensor a topic and a source of its own";
+  waiting_.clear();
+  update([&](SourceReport* report) { report->alternation = problem; });
+  return problem;
 }
 
 /// [s] How much earlier a stamp is than the newest one that is in use or waits; negative: it is
