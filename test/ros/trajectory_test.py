@@ -286,12 +286,10 @@ class TrajectoryTest(pt.NodeTest):
         self.assertGreater(len(told), 20)
         for message in told:
             self.assertEqual(message.header.frame_id, "odom")
-            # The tray is as late as tf is; a base at another instant than it would be 0.1 m off. The
-            # base is where it was told last, which may be one message before the tray: 0.3 m/s for
-            # 20 ms or somewhat more, at 0.2 m/s.
+            # The tray is as late as tf is; a base at another instant than it would be 0.1 m off.
             if (message.header.stamp - message.start).to_sec() < TOUCH - 0.3:
                 contact = (message.contact - message.start).to_sec()
-                self.assertTrue(TOUCH - 0.2 < contact <= TOUCH + 0.06, (contact, TOUCH))
+                self.assertTrue(TOUCH - 0.2 < contact <= TOUCH, (contact, TOUCH))
 
     def test_a_base_whose_poses_are_stamped_ahead(self):
         begin, speed, ahead = rospy.Time.now(), -0.3, 0.5

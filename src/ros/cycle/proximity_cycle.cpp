@@ -69,6 +69,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   status_input_.findings = model_findings_;
   asked_.request = {model_->robot, poses_.stamp, pose_timeout_};
   selection_.update(now, sources, asked_.request, &status_input_);
+  if (pose_source_ && pose_source_->is_newest()) look_up_poses(now);
   take_warm_queries();
   describe_pose_problems(transform_problem);
   const double preparation = watch.lap();

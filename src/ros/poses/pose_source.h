@@ -82,6 +82,12 @@ class PoseSource {
   /// Whether the poses are of a configuration that the robot need not be in.
   virtual bool is_stated() const { return false; }
 
+  /// Whether each pose is the newest one, not that of one common instant. Then look_up() comes
+  /// after the lookup of obstacles: what stands on a base that drives would else be newer than the
+  /// base, and farther from the robot than it is. Older than the base it is late, which is taken
+  /// off.
+  virtual bool is_newest() const { return false; }
+
   /// Names a likely cause for the user whose links have no pose.
   virtual std::string hint() const = 0;
 };

@@ -45,6 +45,7 @@ class StatedPoseSource : public KinematicPoseSource {
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   bool is_stated() const override { return true; }
+  bool is_newest() const override { return stamp_ == Stamp::kNow; }
   std::string hint() const override;
 
  private:
