@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <boost/make_shared.hpp>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <thread>
@@ -401,6 +403,38 @@ TEST(TransformBuffer, inGapsOfWhatHasMovedNoPoseIsKnown) {
   add(95.0, 0.0);
   add(95.4, 1.0);
   EXPECT_EQ(problem(95.2), "");
+}
+
+// A cloud that was placed by the old transform was counted as placed by the new one.
+TEST_F(TransformBufferTest, aPoseIsNotOlderThanTheStaticChangesCountedBefore) {
+  const ros::Time now(100.0);
+  ASSERT_EQ(buffer.add(transform("world", "camera", 0.0), "/a", true, now), "");
+  std::atomic<int> begun{0}, ended{0};
+  constexpr int kTimes = 20000;
+  double x = 0.0;
+  std::uint64_t changes = 0;
+  std::thread placing([&] {
+    for (int k = 1; k <= kTimes; ++k) {
+      while (begun < k) std::this_thread::yield();
+      for (volatile int wait = 0; wait < (k * 37) % 3000;) wait = wait + 1;
+      changes = buffer.static_changes();
+      Eigen::Isometry3d X;
+      EXPECT_EQ(look_up(buffer, "world", "camera", now, &X), "");
+      x = X.translation().x();
+      ended = k;
+    }
+  });
+  int old = 0, missed = 0;
+  for (int k = 1; k <= kTimes; ++k) {
+    begun = k;
+    buffer.add(transform("world", "camera", 0.0, k % 2), "/a", true, now);
+    while (ended < k) std::this_thread::yield();
+    if (x == k % 2) continue;
+    ++old;
+    if (!buffer.has_static_change("world", "camera", changes)) ++missed;
+  }
+  placing.join();
+  EXPECT_EQ(missed, 0) << "of " << old;
 }
 
 }  // namespace

@@ -67,9 +67,13 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   const TimePoint begin = Stopwatch::Clock::now();
   status_input_.deadline = DeadlineCost();
   status_input_.findings = model_findings_;
-  asked_.request = {model_->robot, poses_.stamp, pose_timeout_};
-  selection_.update(now, sources, asked_.request, &status_input_);
-  if (pose_source_ && pose_source_->is_newest()) look_up_poses(now);
+  SnapshotRequest& request = asked_.request;
+  request.model = model_->robot;
+  request.time = poses_.stamp;
+  request.max_age = pose_timeout_;
+  if (pose_source_) request.root = pose_source_->newest_root(&request.X_FR);
+  selection_.update(now, sources, request, &status_input_);
+  if (!request.root.empty()) pose_source_->look_up_joints_again(now, &poses_);
   take_warm_queries();
   describe_pose_problems(transform_problem);
   const double preparation = watch.lap();

@@ -316,10 +316,11 @@ std::string SensorSource::use(const Measurement& measurement) {
 /// A self-filter by view corrects the sensor's pose by what it has seen before: in another frame,
 /// or since a sensor was calibrated, that pose is right or wrong in another way.
 void SensorSource::begin_view(const std::string& frame) {
+  const std::uint64_t changes = buffer_.static_changes();
   const bool is_same =
       frame == view_frame_ && !buffer_.has_static_change(target_.fixed_frame, frame, view_changes_);
   view_frame_ = frame;
-  view_changes_ = buffer_.static_changes();
+  view_changes_ = changes;
   if (is_same || config_.ingest.self_filter_mode != SelfFilterMode::kView) return;
   ingest_ = Ingest(ingest_config(config_));
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
@@ -104,6 +105,23 @@ std::optional<ros::master::V_TopicInfo> published_topics() {
 
 }  // namespace
 
+std::string look_up_for(const SnapshotRequest& request, const TransformBuffer& buffer,
+                        const std::string& fixed, const std::string& frame, Eigen::Isometry3d* X_FB,
+                        Lag* lag) {
+  if (request.root.empty() || without_slash(frame) == without_slash(fixed)) {
+    return look_up_near(buffer, fixed, frame, request.time, request.max_age, X_FB, lag);
+  }
+  Eigen::Isometry3d X_RB;
+  std::string problem =
+      look_up_near(buffer, request.root, frame, request.time, request.max_age, &X_RB, lag);
+  if (!problem.empty()) return problem;
+  *X_FB = request.X_FR * X_RB;
+  for (std::size_t i = 0; i < lag->windows; ++i) {
+    lag->moved[i] = request.X_FR * lag->moved[i] * request.X_FR.inverse();
+  }
+  return "";
+}
+
 Source::Source(const SourceConfig& config, const ros::NodeHandle& nh, const TransformBuffer& buffer,
                const std::string& own)
     : config_(config),
@@ -181,8 +199,7 @@ std::string Source::place(const SnapshotRequest& request, const SourceSnapshot& 
   const auto place_frame = [&](const std::string& frame, Lag* lag, Eigen::Isometry3d* X) {
     X->setIdentity();
     if (frame == kFixedFrame) return true;
-    const std::string found =
-        look_up_near(buffer_, original.fixed_frame, frame, request.time, request.max_age, X, lag);
+    const std::string found = look_up_for(request, buffer_, original.fixed_frame, frame, X, lag);
     if (problem.empty()) problem = found;
     return found.empty();
   };

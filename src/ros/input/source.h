@@ -30,7 +30,16 @@ struct SnapshotRequest {
   std::shared_ptr<const RobotModel> model;  ///< that the snapshot has to be made with
   ros::Time time;        ///< a map is placed where it is then, or else at the newest known instant
   double max_age = 0.0;  ///< [s] allowed age of that instant
+  std::string root;      ///< see PoseSource::newest_root(); empty: frames are looked up in frame F
+  Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();  ///< used with `root`
 };
+
+/// Looks up where a frame is for a request, as look_up_near() does.
+/// @param fixed  frame F
+/// @param X_FB   receives the pose of the frame
+std::string look_up_for(const SnapshotRequest& request, const TransformBuffer& buffer,
+                        const std::string& fixed, const std::string& frame, Eigen::Isometry3d* X_FB,
+                        Lag* lag);
 
 /// A source of obstacles as cycles and services see it.
 class ObstacleSource {

@@ -89,45 +89,65 @@ void StatedPoseSource::check_mimics(const ros::Time& now, std::vector<PoseProble
   }
 }
 
+/// Looks up the newest pose of what is left out.
+std::string StatedPoseSource::look_up_latest(const std::string& to, const std::string& from,
+                                             const ros::Time& now, Eigen::Isometry3d* X) {
+  ros::Time stamp;
+  std::string problem = look_up_newest(buffer_, to, from, now, timeout_, X, &stamp);
+  if (!problem.empty() || stamp.isZero()) return problem;
+  instant_ = std::min(instant_, stamp);
+  // Transforms may be stamped ahead.
+  if (stamp_ == Stamp::kNow && stamp > now) problem = ist::look_up(buffer_, to, from, now, X);
+  return problem;
+}
+
 void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   reset(now, poses);
   root_known_ = false;
-  mimics_follow_ = true;
+  instant_ = now;
   kinematics_->place_joints(q_, &joints_);
   if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
+  const std::string problem = look_up_latest(fixed_frame_, kinematics_->bodies()[0], now, &X_FR_);
+  if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
+  look_up_joints(now, poses);
+}
+
+std::string StatedPoseSource::newest_root(Eigen::Isometry3d* X_FR) const {
+  if (stamp_ != Stamp::kNow || !root_known_) return "";
+  *X_FR = X_FR_;
+  return kinematics_->bodies()[0];
+}
+
+void StatedPoseSource::look_up_joints_again(const ros::Time& now, StampedLinkPoses* poses) {
+  reset(now, poses);
+  kinematics_->place_joints(q_, &joints_);
+  look_up_joints(now, poses);
+}
+
+/// Looks up the joints that are left out, and places the links.
+void StatedPoseSource::look_up_joints(const ros::Time& now, StampedLinkPoses* poses) {
   const auto& bodies = kinematics_->bodies();
   const auto& joints = kinematics_->joints();
-  ros::Time instant = now;  // the newest at which tf knows all that is left out
-  const auto look_up_latest = [&](const std::string& to, const std::string& from,
-                                  Eigen::Isometry3d* X) {
-    ros::Time stamp;
-    std::string problem = look_up_newest(buffer_, to, from, now, timeout_, X, &stamp);
-    if (!problem.empty() || stamp.isZero()) return problem;
-    instant = std::min(instant, stamp);
-    // Transforms may be stamped ahead.
-    if (stamp_ == Stamp::kNow && stamp > now) problem = ist::look_up(buffer_, to, from, now, X);
-    return problem;
-  };
-  std::string problem = look_up_latest(fixed_frame_, bodies[0], &X_FR_);
-  if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
+  mimics_follow_ = true;
   std::vector<PoseProblem> joint_problems(joints.size());
   std::vector<std::size_t> left_out;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints_.known[j]) continue;
     left_out.push_back(j);
     joint_problems[j].text =
-        look_up_latest(bodies[joints[j].parent], bodies[joints[j].child], &joints_.X_PC[j]);
+        look_up_latest(bodies[joints[j].parent], bodies[joints[j].child], now, &joints_.X_PC[j]);
   }
-  // At the present each is where tf knew it last, as objects on a base that drives are.
+  // At the present each is where tf knew it last.
   const bool is_common = stamp_ == Stamp::kOfRobot;
-  if (is_common) problem = ist::look_up(buffer_, fixed_frame_, bodies[0], instant, &X_FR_);
+  std::string problem;
+  if (is_common) problem = ist::look_up(buffer_, fixed_frame_, bodies[0], instant_, &X_FR_);
   if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
   root_known_ = true;
   for (const std::size_t j : left_out) {
     std::string& why = joint_problems[j].text;
     const std::string &to = bodies[joints[j].parent], &from = bodies[joints[j].child];
     if (why.empty() && is_common) {
-      why = ist::look_up(buffer_, to, from, instant, &joints_.X_PC[j]);
+      why = ist::look_up(buffer_, to, from, instant_, &joints_.X_PC[j]);
     }
     joints_.known[j] = why.empty();
     if (!why.empty()) {
@@ -135,7 +155,7 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
     }
   }
   check_mimics(now, &joint_problems);
-  poses->stamp = stamp_ == Stamp::kNow ? now : instant;
+  poses->stamp = stamp_ == Stamp::kNow ? now : instant_;
   place(joint_problems, poses);
 }
 

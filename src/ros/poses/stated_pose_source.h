@@ -45,16 +45,21 @@ class StatedPoseSource : public KinematicPoseSource {
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   bool is_stated() const override { return true; }
-  bool is_newest() const override { return stamp_ == Stamp::kNow; }
+  std::string newest_root(Eigen::Isometry3d* X_FR) const override;
+  void look_up_joints_again(const ros::Time& now, StampedLinkPoses* poses) override;
   std::string hint() const override;
 
  private:
+  std::string look_up_latest(const std::string& to, const std::string& from, const ros::Time& now,
+                             Eigen::Isometry3d* X);
+  void look_up_joints(const ros::Time& now, StampedLinkPoses* poses);
   std::string why_strays(std::size_t joint, const ros::Time& now) const;
   void check_mimics(const ros::Time& now, std::vector<PoseProblem>* problems);
 
   const double mimic_tolerance_;
   const Stamp stamp_;
   std::vector<double> q_;  ///< by joint; NaN where it is left out
+  ros::Time instant_;      ///< the newest at which tf knows all that is left out
   bool root_known_ = false;
   bool mimics_follow_ = true;
 };

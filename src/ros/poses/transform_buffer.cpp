@@ -129,11 +129,14 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
                                  const TransformPublisher& publisher, bool is_static,
                                  const ros::Time& now) {
   std::string fault = why_unusable(transform, is_static, now);
-  bool is_new = true;
-  if (fault.empty()) fault = note(transform, publisher, is_static, now, &is_new);
-  if (fault.empty() && is_new) {
+  if (fault.empty()) {
+    bool is_new = true;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    fault = note(transform, publisher, is_static, now, &is_new);
     try {
-      if (!setTransform(transform, publisher.name, is_static)) fault = "is not used: tf refuses it";
+      const bool is_refused =
+          fault.empty() && is_new && !setTransform(transform, publisher.name, is_static);
+      if (is_refused) fault = "is not used: tf refuses it";
     } catch (const std::exception& error) {
       fault = std::string("is not used: ") + error.what();
     }
@@ -141,14 +144,13 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
   return fault.empty() ? "" : refuse(transform, publisher.name, fault, is_static);
 }
 
-/// Notes a transform in the record of its frame.
+/// Notes a transform in the record of its frame. The caller holds mutex_.
 /// @param is_new  receives false where tf has it already, and would log it, and for joint states,
 ///                which have no connection here, where they are not in order
 /// @returns empty, or why it cannot be used beside the others
 std::string TransformBuffer::note(const geometry_msgs::TransformStamped& transform,
                                   const TransformPublisher& publisher, bool is_static,
                                   const ros::Time& now, bool* is_new) {
-  const std::lock_guard<std::mutex> lock(mutex_);
   Record* record = find_or_make(without_slash(transform.child_frame_id));
   if (!record) return format_text("is not used: there are %zu frames", kMaxFrames);
   change_statements([&](FrameStatements* all) { all->add(transform, publisher, is_static, now); },
@@ -262,8 +264,8 @@ void TransformBuffer::change_statements(const Change& change, Record* record) {
   if (is_disputed || !was_disputed) return;
   --disputes_;
   for (const auto& left : statements.statics()) {
-    setTransform(left, "", true);
     note_static_change(record);
+    setTransform(left, "", true);
   }
 }
 
@@ -378,6 +380,11 @@ std::string TransformBuffer::dispute(const std::string& fixed, const std::string
     if (!record->frozen.empty()) return record->frozen;
   }
   return "";
+}
+
+std::uint64_t TransformBuffer::static_changes() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return static_changes_;
 }
 
 bool TransformBuffer::has_static_change(const std::string& fixed, const std::string& frame,

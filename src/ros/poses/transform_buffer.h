@@ -86,8 +86,9 @@ class TransformBuffer : public tf2::BufferCore {
   std::string why_refused(const std::string& fixed, const std::string& frame) const;
 
   /// Counts the static transforms that have been replaced by others: what stands there was moved,
-  /// or was somewhere else all the time.
-  std::uint64_t static_changes() const { return static_changes_; }
+  /// or was somewhere else all the time. One that is being replaced is waited for: a pose that is
+  /// looked up after the count is not older than it.
+  std::uint64_t static_changes() const;
   /// Whether one between two frames is among those since static_changes() was `since`. It costs
   /// nothing when there is none.
   bool has_static_change(const std::string& fixed, const std::string& frame,
