@@ -82,15 +82,16 @@ class PoseSource {
   /// Whether the poses are of a configuration that the robot need not be in.
   virtual bool is_stated() const { return false; }
 
-  /// Where each pose is the newest one, and not of one common instant, obstacles in frames that
-  /// move are looked up in the root link's frame R: so robot and obstacle are of one instant,
+  /// Obstacles in frames that move are looked up in the root link's frame R where each pose is the
+  /// newest one, and not that of one common instant: so robot and obstacle are of one instant,
   /// however old the root's own pose is, and however it moves.
   /// @param X_FR  receives the pose of R of the last look_up()
   /// @returns R; empty where poses are of one instant, or R has none
   virtual std::string newest_root(Eigen::Isometry3d* /*X_FR*/) const { return ""; }
 
-  /// With newest_root(), looks the joints up again after the obstacles: one on a link that a joint
-  /// moves would else be newer than the link. What is older is late, which is taken off.
+  /// The joints are looked up again after the obstacles, with newest_root(): an obstacle on a link
+  /// that a joint moves would else be newer than the link. What is older is late, which is taken
+  /// off.
   virtual void look_up_joints_again(const ros::Time& /*now*/, StampedLinkPoses* /*poses*/) {}
 
   /// Names a likely cause for the user whose links have no pose.
