@@ -112,7 +112,7 @@ class CycleBenchmark {
         solids = posed_solids(*trial_.robot, X_FL, known);
         ingest.run(trial_.frame.raw(), trial_.frame.X_FS, solids, now_.toSec(),
                    source_->cloud(now_));
-        warm_up_.run(*source_, *source_->newest({trial_.robot, now_, 0.0}));
+        warm_up_.run(*source_, *source_->newest({}));
       }
       now_ += ros::Duration(0.001);
       poses_->set(X_FL);
