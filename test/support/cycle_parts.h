@@ -2,6 +2,7 @@
 
 #include <ros/time.h>
 
+#include <array>
 #include <limits>
 #include <memory>
 #include <string>
@@ -48,7 +49,8 @@ class StatedSource : public ObstacleSource {
     return &snapshot_->cloud;
   }
   /// The cloud's frame is late.
-  void set_lag(const Lag& lag) { snapshot_->lags = {lag}; }
+  void set_lag(const Lag& lag) { snapshot_->lags = {{lag, Lag()}}; }
+  void set_lags(const std::array<Lag, 2>& lags) { snapshot_->lags = {lags}; }
 
  private:
   SourceReport report_;

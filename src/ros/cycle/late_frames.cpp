@@ -11,6 +11,28 @@ constexpr double kMostTurned = 0.5;  // [rad] in the age of a pose
 
 double turn_of(const Eigen::Isometry3d& moved) { return Eigen::AngleAxisd(moved.linear()).angle(); }
 
+/// [rad] How far a frame may have turned.
+double turn_of(const Lag& lag) {
+  double most = 0.0;
+  for (const Eigen::Isometry3d& moved : lag.moves()) most = std::max(most, turn_of(moved));
+  return turn_of(lag.apart) + lag.age / lag.window * most;
+}
+
+/// [m] How far a motion takes what is within a sphere.
+double way_of(const Eigen::Isometry3d& moved, const Eigen::Vector3d& center, double radius) {
+  return (moved * center - center).norm() + turn_of(moved) * radius;
+}
+
+/// [m] How far what stands in a frame may be from where it is taken to be.
+double way_of(const Lag& lag, const Eigen::Vector3d& center, double radius) {
+  const double apart = way_of(lag.apart, center, radius);
+  double most = 0.0;
+  for (const Eigen::Isometry3d& moved : lag.moves()) {
+    most = std::max(most, way_of(moved, center, radius + apart));
+  }
+  return apart + lag.age / lag.window * most;
+}
+
 }  // namespace
 
 void LateFrames::begin() {
@@ -21,7 +43,7 @@ void LateFrames::begin() {
 }
 
 void LateFrames::add(const Lag& lag) {
-  if (lag.windows > 0) lags_.push_back(&lag);
+  if (lag.windows > 0 || !lag.apart.matrix().isIdentity(0.0)) lags_.push_back(&lag);
 }
 
 /// [m] How much nearer to a link an obstacle may have come that is `bound` from it.
@@ -34,11 +56,7 @@ double LateFrames::shift(std::size_t link, double bound, const Lag** lag) const 
 double LateFrames::range(double max_distance) const {
   double farthest = max_distance, turn = 0.0;
   if (lags_.empty() && links_.empty()) return farthest;
-  for (const Lag* lag : lags_) {
-    for (const Eigen::Isometry3d& moved : lag->moves()) {
-      turn = std::max(turn, lag->age / lag->window * turn_of(moved));
-    }
-  }
+  for (const Lag* lag : lags_) turn = std::max(turn, turn_of(*lag));
   for (std::size_t i = 0; i < known_.size(); ++i) {
     if (!known_[i] || !robot_.links[i].usable()) continue;
     // What is farther away moves more where its frame turns.
@@ -73,13 +91,10 @@ void LateFrames::lower(double max_distance, std::vector<LinkProximity>* answers)
 double LateFrames::within(const Eigen::Vector3d& center, double radius, const Lag** lag) const {
   double most = 0.0;
   for (const Lag* one : lags_) {
-    for (const Eigen::Isometry3d& moved : one->moves()) {
-      const double turned = turn_of(moved) * radius;
-      const double there = one->age / one->window * ((moved * center - center).norm() + turned);
-      if (there <= most) continue;
-      most = there;
-      if (lag) *lag = one;
-    }
+    const double there = way_of(*one, center, radius);
+    if (there <= most) continue;
+    most = there;
+    if (lag) *lag = one;
   }
   return most;
 }

@@ -208,10 +208,11 @@ void ProximityCycle::note_late_frames() {
     if (!source) continue;
     const std::size_t objects = source->surfaces ? source->world.X_FB.size() : 0;
     for (std::size_t i = 0; i < source->lags.size(); ++i) {
-      const Lag& lag = source->lags[i];
-      // Objects that the robot carries move with the configuration that is stated; maps stay.
-      if (i < objects && is_carried(lag.frame)) continue;
-      (i < objects ? late_worlds_ : late_maps_).add(lag);
+      for (const Lag& lag : source->lags[i]) {
+        // Objects that the robot carries move with the configuration that is stated; maps stay.
+        if (i < objects && is_carried(lag.frame)) continue;
+        (i < objects ? late_worlds_ : late_maps_).add(lag);
+      }
     }
   }
   const Span<const double> moved =

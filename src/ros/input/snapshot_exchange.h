@@ -3,6 +3,7 @@
 #include <ros/time.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -30,8 +31,8 @@ struct SourceSnapshot {
   std::uint64_t static_changes = 0;    ///< TransformBuffer::static_changes() when it was placed
   /// The map's boxes -> `map_frame`.
   Eigen::Isometry3d X_BM = Eigen::Isometry3d::Identity();
-  /// The lags of the frames of a map or of known objects whose poses are late.
-  std::vector<Lag> lags;
+  /// The lags of the frames of a map or of known objects whose poses are late, see look_up_for().
+  std::vector<std::array<Lag, 2>> lags;
   /// The obstacles that the source remembers and the cloud does not show; null: none.
   std::shared_ptr<const SourceSnapshot> memory;
   /// By group of the zones: what it holds of the cloud's points, which are no obstacles for the

@@ -107,18 +107,23 @@ std::optional<ros::master::V_TopicInfo> published_topics() {
 
 std::string look_up_for(const SnapshotRequest& request, const TransformBuffer& buffer,
                         const std::string& fixed, const std::string& frame, Eigen::Isometry3d* X_FB,
-                        Lag* lag) {
-  if (request.root.empty() || without_slash(frame) == without_slash(fixed)) {
-    return look_up_near(buffer, fixed, frame, request.time, request.max_age, X_FB, lag);
+                        std::array<Lag, 2>* lags) {
+  auto& [in_F, in_R] = *lags;
+  in_R.windows = 0;
+  in_R.apart.setIdentity();
+  std::string problem =
+      look_up_near(buffer, fixed, frame, request.time, request.max_age, X_FB, &in_F);
+  if (request.root.empty() || !problem.empty() || without_slash(frame) == without_slash(fixed)) {
+    return problem;
   }
   Eigen::Isometry3d X_RB;
-  std::string problem =
-      look_up_near(buffer, request.root, frame, request.time, request.max_age, &X_RB, lag);
+  problem = look_up_near(buffer, request.root, frame, request.time, request.max_age, &X_RB, &in_R);
   if (!problem.empty()) return problem;
+  const Eigen::Isometry3d X_RF = request.X_FR.inverse(), last_F = *X_FB;
   *X_FB = request.X_FR * X_RB;
-  for (std::size_t i = 0; i < lag->windows; ++i) {
-    lag->moved[i] = request.X_FR * lag->moved[i] * request.X_FR.inverse();
-  }
+  in_F.apart = last_F * X_FB->inverse();
+  for (std::size_t i = 0; i < in_R.windows; ++i)
+    in_R.moved[i] = request.X_FR * in_R.moved[i] * X_RF;
   return "";
 }
 
@@ -196,10 +201,11 @@ std::string Source::place(const SnapshotRequest& request, const SourceSnapshot& 
   std::vector<Eigen::Isometry3d>& X_FB = placed->world.X_FB;
   placed->lags.resize(X_FB.size() + (original.cloud.boxes ? 1 : 0));
   placed->is_placed.resize(X_FB.size(), true);
-  const auto place_frame = [&](const std::string& frame, Lag* lag, Eigen::Isometry3d* X) {
+  const auto place_frame = [&](const std::string& frame, std::array<Lag, 2>* lags,
+                               Eigen::Isometry3d* X) {
     X->setIdentity();
     if (frame == kFixedFrame) return true;
-    const std::string found = look_up_for(request, buffer_, original.fixed_frame, frame, X, lag);
+    const std::string found = look_up_for(request, buffer_, original.fixed_frame, frame, X, lags);
     if (problem.empty()) problem = found;
     return found.empty();
   };

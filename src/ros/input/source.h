@@ -5,6 +5,7 @@
 #include <ros/subscriber.h>
 #include <ros/time.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -34,12 +35,14 @@ struct SnapshotRequest {
   Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();  ///< used with `root`
 };
 
-/// Looks up where a frame is for a request, as look_up_near() does.
+/// Looks up where a frame is for a request, as look_up_near() does. With a root the frame is taken
+/// to be where it was last in the root's frame. Where it is late, it may move on as it did in that
+/// frame or as in frame F: those are two lags.
 /// @param fixed  frame F
 /// @param X_FB   receives the pose of the frame
 std::string look_up_for(const SnapshotRequest& request, const TransformBuffer& buffer,
                         const std::string& fixed, const std::string& frame, Eigen::Isometry3d* X_FB,
-                        Lag* lag);
+                        std::array<Lag, 2>* lags);
 
 /// A source of obstacles as cycles and services see it.
 class ObstacleSource {

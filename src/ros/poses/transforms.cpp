@@ -119,8 +119,10 @@ std::string look_up_newest(const TransformBuffer& buffer, const std::string& fix
 std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
                          const std::string& frame, const ros::Time& time, double max_age,
                          Eigen::Isometry3d* X_FT, Lag* lag) {
+  lag->frame = frame;
   lag->age = 0.0;
   lag->windows = 0;
+  lag->apart.setIdentity();
   if (is_known(buffer, fixed, frame, time, nullptr)) {
     return look_up(buffer, fixed, frame, time, X_FT);
   }
@@ -132,7 +134,6 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
     *X_FT = X_newest;
     return "";
   }
-  lag->frame = frame;
   lag->age = std::abs(seconds_between(stamp, time));
   lag->window = std::max(lag->age, kLeastWindow);
   Eigen::Isometry3d X_after = X_newest;
