@@ -41,7 +41,7 @@ struct Lag {
   double window = 1.0;      ///< [s] in each of which it moved by one of moves(), in frame F
   std::size_t windows = 0;  ///< of which its poses are known, the last one first
   std::array<Eigen::Isometry3d, kMostWindows> moved;
-  /// From where it is taken to be to where it was last, in frame F.
+  /// The motion from where it is taken to be to where it was last, in frame F.
   Eigen::Isometry3d apart = Eigen::Isometry3d::Identity();
 
   Span<const Eigen::Isometry3d> moves() const { return {moved.data(), windows}; }
