@@ -362,6 +362,23 @@ class PlanningSceneTest(unittest.TestCase):
         self.bridges[0] = Bridge("/scenes", "monitored_planning_scene", "objects")
         self.distance(0.15, "the part, from the next bridge", "noetic")
 
+    def test_9_a_connection_that_is_lost_and_a_publisher_that_is_gone(self):
+        self.noetic.send(self.noetic.box("part", (0, 0.35, 0)), is_diff=False)
+        self.distance(0.15, "the part", "noetic")
+        self.noetic.send(self.noetic.box("other", (0, 0, 0.9)))
+        # The master says nothing of it: so rospy leaves a publisher that ends and begins too fast.
+        for connection in list(self.noetic.publisher.impl.connections):
+            connection.close()
+        self.node.wait_for_unknown(ProximityArray.NO_CLOUD, "has another publisher than before")
+        self.noetic.send(self.noetic.box("part", (0, 0.4, 0)), is_diff=False)
+        self.distance(0.2, "the part of the full scene", "noetic")
+        self.noetic.stop()
+        told = self.node.wait_for_status(ProximityArray.DEGRADED, "objects are held as they were")
+        self.assertAlmostEqual(pt.link(told, "ball_link").distance, 0.2, 6)
+        self.noetic.start()
+        self.noetic.send(self.noetic.box("part", (0, 0.35, 0)), is_diff=False)
+        self.distance(0.15, "the part of the next publisher", "noetic")
+
 
 if __name__ == "__main__":
     pt.run("planning_scene_test", PlanningSceneTest)
