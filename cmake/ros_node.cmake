@@ -109,5 +109,5 @@ catkin_install_python(PROGRAMS src/nodes/proximity_table src/nodes/proximity_rvi
   src/nodes/planning_scene_bridge
   src/nodes/trajectory_bridge
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
-install(FILES src/nodes/scene_objects.py src/nodes/scene_state.py
+install(FILES src/nodes/lasting_subscriber.py src/nodes/scene_objects.py src/nodes/scene_state.py
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

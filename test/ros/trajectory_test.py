@@ -572,6 +572,14 @@ class TrajectoryTest(pt.NodeTest):
                 cancel.publish(GoalID())
                 self.wait(lambda m: m.state == m.NONE, "the end of " + kind, begin)
                 publisher.unregister()
+            # A connection that ends without the master's word is made again.
+            publisher = rospy.Publisher(self.namespace + "/goal", type(message), queue_size=1)
+            pt.wait_until(lambda: publisher.get_num_connections() > 0, "the bridge")
+            for connection in list(publisher.impl.connections):
+                connection.close()
+            publisher.impl.connections.clear()
+            pt.wait_until(lambda: publisher.get_num_connections() > 0, "the bridge, once more")
+            publisher.unregister()
             message = dynamic_message("other_msgs/Thing", "int32 number")
             publisher = rospy.Publisher(self.namespace + "/goal", type(message), queue_size=1)
             pt.wait_until(lambda: publisher.get_num_connections() > 0, "the bridge")
