@@ -8,6 +8,8 @@ namespace {
 
 constexpr double kMaxInterval = 0.2;  // [s] between the poses of the robot's part
 constexpr double kBaseline = 0.02;    // [s] a shorter one makes a speed of the encoders' last bits
+// [s] Between clouds. What is measured anew in each cycle would fill the estimate in no time.
+constexpr double kSpacing = 0.008;
 
 // [m] What two answers to one scene may differ by: rounding, and points within the tolerance.
 constexpr double kAnswerNoise = 3e-4;
@@ -160,13 +162,14 @@ double ClosingSpeed::obstacle_speed(const Pose& now, const LinkProximity& result
   latest_generation_ = nearest.generation;
 
   Track* track = find_track(nearest.source);
-  const bool is_new = !std::isfinite(track->approach.newest_stamp());
-  if (is_new || track->generation != nearest.generation) {
+  const double since = nearest.stamp - track->approach.newest_stamp();  // infinite at first
+  const bool is_too_soon = since > 0.0 && since < kSpacing;
+  if (std::isinf(since) || (track->generation != nearest.generation && !is_too_soon)) {
     track->generation = nearest.generation;
     track->approach.add(nearest.stamp, retreat_ - now.distance);
   }
   const double speed = track->approach.speed();
-  return std::isnan(speed) && nearest.stands_still ? 0.0 : speed;
+  return nearest.stands_still ? 0.0 : speed;
 }
 
 ClosingRates ClosingSpeed::update(double time, const LinkProximity& result,
@@ -183,8 +186,7 @@ ClosingRates ClosingSpeed::update(double time, const LinkProximity& result,
     rates.total = rates.robot + rates.obstacles;
   }
   const double age = std::max(time - nearest.stamp, 0.0);
-  rates.time_to_contact =
-      time_to_contact(result, rates.total, nearest.stands_still ? 0.0 : rates.obstacles * age);
+  rates.time_to_contact = time_to_contact(result, rates.total, rates.obstacles * age);
   remember(now);
   return rates;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <random>
 #include <set>
@@ -17,8 +18,9 @@ namespace {
 /// By body: what decides whether two bodies with geometry are rigidly connected, or adjacent (one
 /// is an ancestor of the other, with no body that has geometry between them).
 struct Neighbours {
-  Neighbours(const Kinematics& kinematics, const std::vector<bool>& has_geometry)
-      : rigid_group(has_geometry.size(), 0), ancestor(has_geometry.size(), 0) {
+  explicit Neighbours(const Kinematics& kinematics)
+      : rigid_group(kinematics.bodies().size(), 0), ancestor(kinematics.bodies().size(), kNone) {
+    const std::vector<bool>& has_geometry = kinematics.has_geometry();
     for (const Kinematics::Joint& joint : kinematics.joints()) {  // a parent comes before its child
       const bool is_fixed = joint.type == JointType::kFixed;
       rigid_group[joint.child] = is_fixed ? rigid_group[joint.parent] : joint.child;
@@ -32,8 +34,9 @@ struct Neighbours {
     return never_move(a, b) || ancestor[below] == above;
   }
 
+  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> rigid_group;  ///< the body nearest to the root that fixed joints lead to
-  std::vector<std::size_t> ancestor;  ///< the nearest with geometry; the root where there is none
+  std::vector<std::size_t> ancestor;     ///< the nearest with geometry of its own
 };
 
 // Pairs of names in any order. An SRDF may hold hundreds of thousands.
@@ -111,12 +114,10 @@ std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinema
                                            const std::vector<bool>& wanted,
                                            const NamePairs& ignored, const CollisionRules& rules) {
   std::vector<std::optional<std::size_t>> body_of_link;
-  std::vector<bool> has_geometry(kinematics.bodies().size(), false);
   for (const LinkModel& link : model.links) {
     body_of_link.push_back(kinematics.find_body(link.name));
-    if (body_of_link.back()) has_geometry[*body_of_link.back()] = true;
   }
-  const Neighbours neighbours(kinematics, has_geometry);
+  const Neighbours neighbours(kinematics);
   const NamePairSet ignored_names(ignored);
   const auto usable = [&](std::size_t i) {
     return wanted[i] && model.links[i].usable() && body_of_link[i].has_value();

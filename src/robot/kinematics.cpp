@@ -62,9 +62,18 @@ Kinematics::Joint make_joint(const JointDescription& description, std::size_t pa
 
 bool Kinematics::Joint::is_free() const { return has_position(type) && source + 1 == child; }
 
+double Kinematics::Joint::way(double from, double to) const {
+  return type == JointType::kContinuous ? std::remainder(to - from, 2.0 * EIGEN_PI) : to - from;
+}
+
 Kinematics::Kinematics(const RobotDescription& description) {
   add_tree(description);
   resolve_mimics(description);
+  has_geometry_.assign(bodies_.size(), false);
+  for (const LinkDescription& link : description.links) {
+    const auto body = find_body(link.name);
+    if (body) has_geometry_[*body] = link.geometry.size() > link.attached || !link.error.empty();
+  }
 }
 
 /// Breadth first, so that every body comes after its parent.

@@ -153,6 +153,17 @@ TEST(ClosingSpeed, TheRobotsPartIsThatOfThePoses) {
   EXPECT_NEAR(rates.time_to_contact, (0.5 - 0.1998) / 0.2, 1e-4);
 }
 
+// What has gone away from the link, and stands still now, does not slow the link's own approach.
+TEST(ClosingSpeed, WhatHasStoppedHasNoSpeed) {
+  OneSource wall;
+  ClosingRates rates;
+  for (int i = 0; i < 20; ++i) rates = wall.cloud(0.5 + 0.01 * i, kMap);
+  EXPECT_NEAR(rates.obstacles, -0.01 / kCloudPeriod, 1e-6);
+  rates = wall.speed.update(20.0 * kCloudPeriod, answer_at(0.69), Eigen::Isometry3d::Identity(),
+                            {kMap, 20, 19.0 * kCloudPeriod, true});
+  EXPECT_EQ(rates.obstacles, 0.0);
+}
+
 TEST(ClosingSpeed, LinkAgainstLink) {
   ClosingSpeed speed;
   EXPECT_TRUE(std::isnan(speed.update_pair(0.0, answer_at(0.5)).total));

@@ -111,6 +111,34 @@ TEST(MemoryMap, LeftTheViewStaysUntilTheDecay) {
   EXPECT_EQ(map.counts().nodes, 0U) << "memory comes back";
 }
 
+// What is seen is as old as its stamp, and what comes late makes nothing else older.
+TEST(MemoryMap, WhatComesLateIsAsOldAsItsStamp) {
+  MemoryConfig config;
+  config.decay = 2.0;
+  MemoryMap map(config);
+  map.insert(wall(1.0F, 0.0));
+  map.insert(wall(1.0F, 10.0));
+  map.insert(wall(1.0F, 9.0));
+  const auto time_seen = [&map](double x) {
+    SeenSpace seen;
+    seen.add(map);
+    return seen.time_seen({x, 0.0, 0.0});
+  };
+  EXPECT_NEAR(time_seen(0.5), 10.0, 0.011);
+  MemoryScan late = wall(1.0F, 9.5);
+  for (Eigen::Vector3f& p : late.hits) p.x() = -p.x();
+  map.insert(late);
+  EXPECT_NEAR(time_seen(-0.5), 9.5, 0.011);
+  EXPECT_NEAR(time_seen(0.5), 10.0, 0.011);
+  map.note_free({{-0.3F, 0.5F, 0.0F, 0.1F}}, 9.2);
+  SeenSpace seen;
+  seen.add(map);
+  EXPECT_NEAR(seen.time_seen({-0.3, 0.5, 0.0}), 9.2, 0.011);
+  map.forget(11.8);
+  EXPECT_TRUE(std::isnan(time_seen(-0.5)));
+  EXPECT_NEAR(time_seen(0.5), 10.0, 0.011);
+}
+
 TEST(MemoryMap, MissesThatLeaveAVoxelOccupiedDoNotProlongItsLife) {
   MemoryConfig config;
   config.decay = 1.0;

@@ -89,6 +89,30 @@ TEST(SelfCollisionPairs, excludesAdjacentAndRigidlyConnectedLinks) {
             without_a);
 }
 
+// What parts two links is the URDF's geometry, be it monitored or not; an attached object is none.
+TEST(SelfCollisionPairs, AdjacentLinksAreThoseOfTheUrdf) {
+  Robot some;
+  RobotModelConfig config;
+  config.links = {"base", "b", "c"};
+  some.model = build_robot_model(some.description, config);
+  EXPECT_EQ(some.names(some.pairs()), (Names{"base-b", "b-c"})) << "a is between base and b";
+
+  AttachedObject object{"tool", "plain", {Sphere{0.1}, Eigen::Isometry3d::Identity(), "sphere"}};
+  Robot carrying;
+  carrying.model = build_robot_model(with_objects(carrying.description, {object}), {});
+  const Names pairs = carrying.names(carrying.pairs());
+  EXPECT_EQ(pairs.count("plain-b") + pairs.count("b-plain"), 1U);
+  EXPECT_EQ(pairs.count("base-plain") + pairs.count("plain-base"), 1U);
+  EXPECT_EQ(pairs.count("a-b"), 0U);
+
+  const std::string urdf =
+      "<robot name='r'><link name='root'/>" + sphere("ball") + joint("continuous", "root", "ball");
+  Robot bare(urdf + "</robot>");
+  object.link = "root";
+  bare.model = build_robot_model(with_objects(bare.description, {object}), {});
+  EXPECT_EQ(bare.pairs().size(), 1U);
+}
+
 // An SRDF may name hundreds of thousands of pairs; the node does not answer, nor end, before it has
 // looked at all of them.
 TEST(SelfCollisionPairs, ManyIgnoredNamesTakeNoTime) {

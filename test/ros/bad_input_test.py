@@ -3,6 +3,8 @@
 
 import os
 import shutil
+import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -14,6 +16,15 @@ from proximity_testing import LinkProximity, ProximityArray
 from std_msgs.msg import Float64
 
 FAR_BOX = pt.transform((0, 0.8, 0))
+OTHER_DRIVER = """
+import proximity_testing as pt, rospy, time
+from sensor_msgs.msg import PointCloud2
+rospy.init_node("other_driver")
+publisher = rospy.Publisher("/bad_clouds/cloud", PointCloud2, queue_size=1)
+while True:
+    publisher.publish(pt.cloud([[9.0, 9.0, 9.0]]))
+    time.sleep(0.05)
+"""
 POINT = [[0.0, 0.0, 0.3]]  # 0.2 m from the ball at the origin
 
 
@@ -64,6 +75,20 @@ class BadCloudTest(unittest.TestCase):
     def tearDown(self):
         for message in self.node.messages[self.begin :]:
             pt.check_invariants(self, message)
+
+    def test_two_drivers_on_one_topic(self):
+        """Each in the same frame: what one of them sees would hide what the other one does."""
+        with self.stream(lambda: pt.cloud(POINT)):
+            self.node.wait_for_distance(0.2, "the point")
+            folder = os.path.dirname(os.path.realpath(__file__))
+            other = subprocess.Popen([sys.executable, "-c", OTHER_DRIVER], cwd=folder)
+            try:
+                told = self.node.wait_for_status(ProximityArray.STALE_CLOUD, "by turns in the frames")
+                self.assertIn("(of /other_driver)", told.status_text)
+            finally:
+                other.kill()
+                other.wait()
+            self.node.wait_for_distance(0.2, "the point once more")
 
     def stream(self, make, rate=20):
         return self.world.repeat(rate, lambda: self.world.cloud_publisher.publish(make()))

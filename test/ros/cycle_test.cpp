@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -265,6 +266,48 @@ TEST(Vouching, NeedsAFreshSourceThatMeasures) {
     EXPECT_EQ(decide(find_all(input, 100.0), true).code, cases[k].status) << "case " << k;
     EXPECT_EQ(clouds_usable(input), cases[k].status == kOk) << "case " << k;
   }
+}
+
+// A map in a frame that moves comes as fast as that. Infinite timeouts say that obstacles do not go
+// stale, not that they stand still.
+TEST_F(Cycle, WhatNeverGoesStaleMayMove) {
+  source_->set_timeout(std::numeric_limits<double>::infinity());
+  CloudSnapshot* map = source_->cloud(now_);
+  const auto boxes = std::make_shared<BoxIndex>();
+  boxes->build({{Eigen::Vector3d(0.0, -0.5, 0.0), Eigen::Vector3d(0.1, 0.5, 1.0)}});
+  map->boxes = boxes;
+  double x = 0.7;  // [m] of the map's frame
+  const auto nearest_after = [&](double seconds, double speed) {
+    boost::shared_ptr<ProximityArray> message = messages_.take();
+    for (const ros::Time end = now_ + ros::Duration(seconds); now_ < end;) {
+      now_ += ros::Duration(0.001);
+      x += 0.001 * speed;
+      map->X_FM = Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0));
+      cycle_->run(now_, sources_, live_, transform_problem_, message.get());
+    }
+    return *std::min_element(message->links.begin(), message->links.end(),
+                             [](const auto& a, const auto& b) { return a.distance < b.distance; });
+  };
+  auto link = nearest_after(0.1, 0.0);
+  EXPECT_EQ(link.closing_speed_obstacles, 0.0);
+  EXPECT_EQ(link.closing_unknown, 0);
+  for (const double speed : {-0.2, 0.2, -0.04}) {
+    link = nearest_after(1.0, speed);
+    EXPECT_NEAR(link.closing_speed_obstacles, -speed, 0.1 * std::abs(speed));
+    if (speed < 0.0) {
+      EXPECT_NEAR(link.time_to_contact, link.lower_bound / -speed, 0.5);
+    }
+  }
+  EXPECT_EQ(nearest_after(1.1, 0.0).closing_speed_obstacles, 0.0) << "it has stopped";
+
+  // A cloud that comes again and again is no obstacle that stands still either.
+  *map = CloudSnapshot();
+  see_wall(0.6F);
+  link = nearest_after(0.1, 0.0);
+  EXPECT_EQ(link.closing_unknown, link.OBSTACLES_UNKNOWN);
+  link = nearest_after(1.1, 0.0);
+  EXPECT_EQ(link.closing_unknown, 0) << "none has come any more";
+  EXPECT_EQ(link.closing_speed_obstacles, 0.0);
 }
 
 // The parts add up, and the report keeps them.

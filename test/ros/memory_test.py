@@ -13,10 +13,11 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ist_proximity.srv import AttachObjectRequest, DetachObject
+from ist_proximity.srv import AttachObjectRequest, DetachObject, QueryProximity
 
 VOXEL = 0.02
 DECAY = 4.0
@@ -36,6 +37,15 @@ SLIDING_BALL = """<robot name="sliding"> <link name="base"/> <link name="hand"/>
   <joint name="grip" type="prismatic"><parent link="base"/><child link="hand"/>
     <limit lower="-1" upper="1" velocity="2" effort="1"/></joint>
 </robot>"""
+
+# Three balls above each other, which slide across the camera's axis.
+BALLS = "<robot name='balls'> <link name='base'/>%s</robot>" % "".join(
+    """<link name="b%d"><collision><geometry><sphere radius="0.08"/></geometry></collision></link>
+  <joint name="j%d" type="prismatic"><parent link="base"/><child link="b%d"/>
+    <origin xyz="1.5 0 %g"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="1" effort="1"/></joint>"""
+    % (i, i, i, 0.25 * i - 0.25)
+    for i in range(3)
+)
 
 
 def patch(distance, half, step=0.008):
@@ -297,6 +307,24 @@ class MemoryTest(pt.NodeTest):
         for ball in self.move_in_cone("obstacle"):
             self.assertEqual(ball.state, LinkProximity.NEAR)
             self.assertAlmostEqual(ball.lower_bound, ball.unseen_distance, places=9)
+
+    # Each configuration that is asked about has its own answers, for all links.
+    def test_what_is_seen_about_other_configurations(self):
+        self.world.points = patch(2.6, 0.9, 0.02)
+        self.world.start_joints({"j0": 0.0, "j1": 0.0, "j2": 0.0})
+        settings = {"memory": dict(LASTING, resolution=0.03), "unknown_space": "report", "max_distance": 1.0}
+        pt.NodeTest.start(self, BALLS, pose_source="joint_states", **settings)
+        self.node.wait_for(lambda m: m.status == 0 and all(one.seen_share > 0.8 for one in m.links), "the view")
+        query = self.node.service("query", QueryProximity)
+        names = ["j0", "j1", "j2"]
+        places = [0.0, 1.3, 0.0, 1.3]  # in view, and not
+        answer = query(states=[JointState(name=names, position=[y] * 3) for y in places])
+        for y, result in zip(places, answer.results):
+            for one in result.links:
+                if y == 0.0:
+                    self.assertGreater(one.seen_share, 0.8, one.link)
+                else:
+                    self.assertEqual(one.seen_share, 0.0, one.link)
 
     # The space that the robot took up is known. An object that it has let go of is still there.
     def test_what_the_robot_lets_go_of_is_not_known(self):

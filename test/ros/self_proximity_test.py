@@ -224,6 +224,20 @@ class SelfProximityTest(unittest.TestCase):
         self.assertTrue(firsts)
         self.assertLessEqual(max(firsts), 1.2 + 1e-6)
 
+    def test_srdf_that_cannot_be_used(self):
+        """It may enable pairs that are left out without it."""
+        name = "/self_srdf/robot_description_semantic"
+        for srdf in ("<robot name='arm'><enable_collisions", {"a": 1}):
+            rospy.set_param(name, srdf)
+            node = self.start("srdf")
+            message = node.wait_for_status(ProximityArray.MODEL_ERROR, "the SRDF in '%s' cannot be used" % name)
+            self.assertTrue(pt.all_unknown(message))
+            rospy.set_param(name, SRDF)
+            self.assertTrue(node.reload().success)
+            node.wait_for_status(ProximityArray.OK)
+            if srdf != {"a": 1}:
+                self.tearDown()
+
     def test_left_out(self):
         for case, srdf in (("by_srdf", SRDF), ("by_default", SRDF_DEFAULT)):
             rospy.set_param("/self_%s/robot_description_semantic" % case, srdf)

@@ -205,5 +205,27 @@ TEST(BaseCommand, IsOfTheBaseInItsOwnAxes) {
   test::expect_says(read_command(message, reader).fault, "cannot move so");
 }
 
+// Positions alone: a joint without limits turns the shorter way round.
+TEST(PositionCommand, GoesTheShorterWay) {
+  const std::string urdf =
+      "<robot name='r'><link name='base'/><link name='a'/><link name='b'/><joint name='round' "
+      "type='continuous'><parent link='base'/><child link='a'/></joint><joint name='slide' "
+      "type='prismatic'><parent link='a'/><child link='b'/><limit lower='-9' upper='9' "
+      "velocity='1' effort='1'/></joint></robot>";
+  CommandReader reader;
+  reader.q = [](const std::string& /*joint*/) { return -3.0; };
+  reader.kinematics = std::make_shared<const Kinematics>(
+      parse_urdf(urdf, GeometrySource::kCollision, [](const std::string&) { return ""; }));
+  trajectory_msgs::JointTrajectory message;
+  message.joint_names = {"round", "slide"};
+  message.points.resize(1);
+  message.points[0].positions = {3.0, 3.0};
+  message.points[0].time_from_start = ros::Duration(2.0);
+  const JointCommand command = read_command(message, reader);
+  ASSERT_EQ(command.fault, "");
+  EXPECT_NEAR(command.velocity[0], 0.5 * (6.0 - 2.0 * EIGEN_PI), 1e-12);
+  EXPECT_NEAR(command.velocity[1], 3.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace ist

@@ -281,6 +281,18 @@ class VelocityFilterTest(SlidesTest):
         free = self.wait_for(FilterState.FREE)
         self.assertEqual(list(free.velocity), [0.0, -0.3])
 
+    def test_object_that_is_attached_near_a_post(self):
+        """Distances from link to link are without it for a while after that."""
+        self.start(0.0, 0.0, self_proximity=True)
+        self.wait_for(FilterState.FREE)
+        self.node.attach("ball", (0.0, 0.25, 0.0), [0.1])  # 0.05 m from the post
+        self.nearest, self.way = np.inf, lambda: WALL - RADIUS - (0.05 - self.q[1])
+        self.wanted = (0.0, 0.4)
+        limited = self.wait_for(FilterState.LIMITED)
+        self.assertEqual(set(limited.links + limited.sources), {"ball", "post"})
+        pt.wait_until(lambda: abs(self.velocity[1]) < 0.01, "the ball to stand")
+        self.assertGreater(self.nearest, 0.005)
+
     def test_distances_from_link_to_link_that_do_not_come(self):
         self.start(0.1, 0.0, self_proximity=True)
         self.check_fault("no distances have come on '%s/proximity/self_proximity'" % self.namespace)

@@ -48,6 +48,7 @@ class StatedSource : public ObstacleSource {
     snapshot_->stamp = snapshot_->counts_from = stamp;
     return &snapshot_->cloud;
   }
+  void set_timeout(double timeout) { report_.timeout = timeout; }
   /// The cloud's frame is late.
   void set_lag(const Lag& lag) { snapshot_->lags = {{lag, Lag()}}; }
   void set_lags(const std::array<Lag, 2>& lags) { snapshot_->lags = {lags}; }

@@ -98,7 +98,6 @@ class ClosingSpeed {
     int source = -1;
     std::uint64_t generation = 0;
     std::uint64_t used = 0;  ///< larger: used later
-    bool stands_still = false;
     ApproachEstimate approach;
   };
 

@@ -110,8 +110,8 @@ class SelfQuery {
 using NamePairs = std::vector<std::pair<std::string, std::string>>;
 
 /// Pairs of usable links that may collide: all except adjacent links (parent and child, also with
-/// links without geometry between them), links that never move relative to each other, and those
-/// that `ignored` names.
+/// links without geometry between them, see Kinematics::has_geometry()), links that never move
+/// relative to each other, and those that `ignored` names.
 /// @param wanted   by link of the model: a pair needs two
 /// @param ignored  in either order; names that the model lacks have no effect
 std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinematics& kinematics,

@@ -60,6 +60,8 @@ class Kinematics {
 
     /// Whether it takes a position of its own.
     bool is_free() const;
+    /// [rad, m] From one position to another; a continuous joint turns the shorter way round.
+    double way(double from, double to) const;
     /// Planar or floating.
     bool has_unstated_pose() const {
       return type == JointType::kPlanar || type == JointType::kFloating;
@@ -70,6 +72,9 @@ class Kinematics {
   const std::vector<std::string>& bodies() const { return bodies_; }
   /// Joint j moves body j + 1.
   const std::vector<Joint>& joints() const { return joints_; }
+  /// By body: whether the description gives it geometry of its own, attached objects aside. What
+  /// cannot be read counts.
+  const std::vector<bool>& has_geometry() const { return has_geometry_; }
   /// @returns the body's index; empty when no body has this name
   std::optional<std::size_t> find_body(const std::string& name) const;
   /// @returns the joint's index; empty when no joint has this name
@@ -108,6 +113,7 @@ class Kinematics {
   double led_position(const std::vector<double>& q, std::size_t joint) const;
 
   std::vector<std::string> bodies_;
+  std::vector<bool> has_geometry_;
   std::vector<Joint> joints_;
   std::unordered_map<std::string, std::size_t> body_of_name_, joint_of_name_;
   std::vector<std::size_t> mimics_;

@@ -77,7 +77,7 @@ void MemoryMap::note_free(Span<const Eigen::Vector4f> spheres, double now) {
   voxels.forget_old();
   for (const Eigen::Vector4f& sphere : spheres) {
     for_each_key_in_sphere(sphere.head<3>().cast<double>(), sphere.w(), voxels.scale(),
-                           [&](const VoxelKey& key) { voxels.assign(key, voxels.least()); });
+                           [&](const VoxelKey& key) { voxels.assign(key, voxels.least(), now); });
   }
 }
 
@@ -128,7 +128,7 @@ std::string MemoryMap::read_file(const std::string& path, double now) {
   const auto fill = [&](const VoxelBoxes& leaves, float log_odds) {
     for (const Eigen::AlignedBox3d& leaf : leaves) {
       for_each_voxel(leaf, voxels.scale(),
-                     [&](const VoxelKey& key) { voxels.assign(key, log_odds); });
+                     [&](const VoxelKey& key) { voxels.assign(key, log_odds, now); });
     }
   };
   fill(octree.free_leaves, voxels.least());

@@ -106,7 +106,7 @@ void VoxelMap::insert(const MemoryScan& scan) {
   find_ends(scan.origin, scan.free_ends);
   for (RayEnd& end : ray_ends_) end.is_hit = false;
   add_rays(scan.origin);
-  apply();
+  apply(tick(std::isfinite(scan.stamp) ? scan.stamp : now_));
   added_ = blocks_.size() - std::min(size_before, blocks_.size());
 }
 
@@ -317,8 +317,9 @@ void VoxelMap::update(VoxelBlock* block, unsigned place, float change, std::uint
 }
 
 /// Notes what a voxel's log-odds are now. A voxel that stays occupied keeps the time of its last
-/// hit.
+/// hit, and what comes late makes none older.
 void VoxelMap::note(VoxelBlock* block, unsigned place, std::uint32_t time, bool is_hit) {
+  if (test_bit(block->known, place)) time = std::max(time, block->time[place]);
   set_bit(place, &block->known);
   if (block->log_odds[place] >= 0.0F) {
     set_bit(place, &block->occupied);
@@ -331,8 +332,7 @@ void VoxelMap::note(VoxelBlock* block, unsigned place, std::uint32_t time, bool 
   block->newest = std::max(block->newest, time);
 }
 
-void VoxelMap::apply() {
-  const std::uint32_t time = tick(now_);
+void VoxelMap::apply(std::uint32_t time) {
   for (VoxelBlock* block : touched_) {
     for_each_bit(without(block->free, block->hit),
                  [&](unsigned place) { update(block, place, miss_, time); });
@@ -340,11 +340,11 @@ void VoxelMap::apply() {
   }
 }
 
-void VoxelMap::assign(const VoxelKey& key, float log_odds) {
+void VoxelMap::assign(const VoxelKey& key, float log_odds, double time) {
   VoxelBlock* block = blocks_.find_or_add(block_id(key));
   if (block == nullptr) return;
   block->log_odds[place_in_block(key)] = log_odds;
-  note(block, place_in_block(key), tick(now_), true);
+  note(block, place_in_block(key), tick(time), true);
 }
 
 void VoxelMap::forget_old() {

@@ -28,8 +28,8 @@ class VoxelMap {
   /// Tells the time; it never goes back.
   void set_now(double time);
   void forget_old();
-  /// Sets a voxel to a log-odds value, or keeps it where there is no memory.
-  void assign(const VoxelKey& key, float log_odds);
+  /// Sets a voxel to a log-odds value of a time [s], or keeps it where there is no memory.
+  void assign(const VoxelKey& key, float log_odds, double time);
 
   const MemoryConfig& config() const { return config_; }
   const VoxelScale& scale() const { return scale_; }
@@ -63,7 +63,7 @@ class VoxelMap {
   void add_rays(const Eigen::Vector3f& origin);
   void update(VoxelBlock* block, unsigned place, float change, std::uint32_t time);
   static void note(VoxelBlock* block, unsigned place, std::uint32_t time, bool is_hit);
-  void apply();
+  void apply(std::uint32_t time);
   void make_place(std::size_t wanted, bool obstacles);
   void remove_empty_blocks();
   void reset_cursor();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "ist_proximity/repulsion/repulsion.h"
 
@@ -24,6 +25,8 @@ bool is_obstacle(std::size_t source, const StatusInput& status) {
 void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
                             const SnapshotRequest& request, StatusInput* status) {
   status->sources.resize(sources.size());
+  time_ = request.time.toSec();
+  motions_.resize(sources.size());
   selected_.clear();
   held_.clear();
   for (std::size_t i = 0; i < sources.size(); ++i) {
@@ -73,12 +76,22 @@ void CloudSelection::take_obstacles(const StatusInput& status) {
     add_clouds(*selected_[i], &clouds_);
     const SourceReport& report = status.sources[i];
     cloud_sources_.resize(clouds_.size(), static_cast<int>(i));
-    cloud_stands_still_.resize(clouds_.size(),
-                               report.is_file || report.is_memory || std::isinf(report.timeout));
+    cloud_stands_still_.resize(clouds_.size(), stands_still(i, report));
     const ros::Time& stamp = selected_[i]->stamp;
     if (report.is_file || report.is_memory || selected_[i]->surfaces) continue;
     if (oldest_stamp_.isZero() || stamp < oldest_stamp_) oldest_stamp_ = stamp;
   }
+}
+
+/// Whether the obstacles of a source that never goes stale do not move: those of a map's frame that
+/// has not for a while, or of a cloud after which none has come for as long.
+bool CloudSelection::stands_still(std::size_t source, const SourceReport& report) {
+  const CloudSnapshot& cloud = selected_[source]->cloud;
+  if (report.is_memory || (report.is_file && !cloud.boxes)) return true;
+  Motion& motion = motions_[source];
+  const std::uint64_t before = std::exchange(motion.cloud, obstacles_key({&cloud}));
+  motion.place.note({&cloud.X_FM, 1}, time_, !cloud.boxes && motion.cloud != before);
+  return (report.is_file || std::isinf(report.timeout)) && motion.place.stands_still(time_);
 }
 
 /// The newest snapshot of a source. What is hidden from a cloud belongs to its snapshot: no cloud
@@ -100,8 +113,13 @@ ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer, int s
   if (source < 0) return {};
   // The points in zones are of the same measurement.
   const CloudSnapshot& whole = selected_[static_cast<std::size_t>(source)]->cloud;
-  return {source, obstacles_key({&whole}), whole.stamp,
-          cloud_stands_still_[static_cast<std::size_t>(answer.source)]};
+  const bool stands_still = cloud_stands_still_[static_cast<std::size_t>(answer.source)];
+  const PlaceMotion& place = motions_[static_cast<std::size_t>(source)].place;
+  // A map that moves is measured anew at each place.
+  if (whole.boxes && !place.stands_still(time_)) {
+    return {source, obstacles_key({&whole}) ^ place.key(), time_, stands_still};
+  }
+  return {source, obstacles_key({&whole}), whole.stamp, stands_still};
 }
 
 int CloudSelection::source_of(const LinkProximity& answer, bool is_world) const {

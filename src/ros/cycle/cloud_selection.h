@@ -3,6 +3,7 @@
 #include <ros/time.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ros/cycle/place_motion.h"
 #include "ros/input/source.h"
 #include "ros/status/status.h"
 
@@ -65,13 +67,22 @@ class CloudSelection {
   const SourceSnapshot* newest(const CloudSources& sources, std::size_t source,
                                const SnapshotRequest& request, const StatusInput& status);
   void take_obstacles(const StatusInput& status);
+  bool stands_still(std::size_t source, const SourceReport& report);
+
+  /// Of the obstacles of a source.
+  struct Motion {
+    std::uint64_t cloud = 0;  ///< the last one's obstacles_key()
+    PlaceMotion place;
+  };
 
   const Reader reader_;
   std::vector<const SourceSnapshot*> selected_;
   std::vector<std::shared_ptr<const SourceSnapshot>> held_;  ///< used with Reader::kOther
   std::vector<const CloudSnapshot*> clouds_;
   std::vector<int> cloud_sources_;
-  std::vector<bool> cloud_stands_still_;  ///< by cloud: its source never goes stale
+  std::vector<bool> cloud_stands_still_;  ///< by cloud
+  std::vector<Motion> motions_;           ///< by source
+  double time_ = 0.0;                     ///< [s] of the link poses
   std::vector<const PosedWorld*> worlds_;
   std::vector<int> world_sources_;  ///< by world: the number of its source
   std::shared_ptr<const RobotSurfaces> surfaces_;

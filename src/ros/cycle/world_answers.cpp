@@ -5,9 +5,6 @@
 namespace ist {
 namespace {
 
-// [s] Frames that have not moved for so long stand still.
-constexpr double kStandsStill = 1.0;
-
 bool is_near(const LinkProximity& answer) {
   return answer.state == LinkState::kNear || answer.state == LinkState::kContact;
 }
@@ -20,19 +17,10 @@ void WorldAnswers::note_motion(const CloudSelection& selection, double time) {
   for (std::size_t w = 0; w < worlds.size(); ++w) {
     Motion& motion = motions_[w];
     const PosedWorld& world = *worlds[w];
-    const auto is_same = [](const Eigen::Isometry3d& one, const Eigen::Isometry3d& other) {
-      return one.matrix() == other.matrix();
-    };
-    if (motion.world == world.world && std::equal(motion.X_FB.begin(), motion.X_FB.end(),
-                                                  world.X_FB.begin(), world.X_FB.end(), is_same)) {
-      continue;
-    }
-    // The first world is no motion.
-    motion.moved = motion.world ? time : motion.moved;
-    ++motion.key;
-    if (motion.world != world.world) ++key_;
+    const bool is_other = motion.world != world.world;
+    motion.place.note(world.X_FB, time, is_other && motion.world);
+    if (is_other) ++key_;
     motion.world = world.world;
-    motion.X_FB = world.X_FB;
   }
 }
 
@@ -81,7 +69,7 @@ void WorldAnswers::combine(SnapshotSpan clouds, std::vector<LinkProximity>* resu
 ClosingSpeed::Nearest WorldAnswers::nearest(const LinkProximity& answer, int source) const {
   if (source < 0) return {};
   const Motion& motion = motions_[static_cast<std::size_t>(answer.source)];
-  return {source, motion.key, time_, time_ - motion.moved > kStandsStill};
+  return {source, motion.place.key(), time_, motion.place.stands_still(time_)};
 }
 
 }  // namespace ist

@@ -9,6 +9,7 @@
 #include "ist_proximity/proximity/world_query.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/cycle/late_frames.h"
+#include "ros/cycle/place_motion.h"
 #include "ros/status/status.h"
 
 namespace ist {
@@ -59,10 +60,8 @@ class WorldAnswers {
  private:
   /// The motion of a world's frames.
   struct Motion {
-    std::uint64_t key = 0;  ///< another one at each cycle in which frames have moved
-    double moved = -1e300;  ///< [s] when they did last
+    PlaceMotion place;
     std::shared_ptr<const KnownWorld> world;
-    std::vector<Eigen::Isometry3d> X_FB;
   };
   void note_motion(const CloudSelection& selection, double time);
 

@@ -345,7 +345,11 @@ std::string CommandFilter::why_not(const JointCommand& command, const ros::Time&
   const ist_proximity::ProximityArray& self = *self_.message;
   const bool is_measured = self.status != ist_proximity::ProximityArray::LOADING &&
                            self.status != ist_proximity::ProximityArray::MODEL_ERROR;
-  return is_measured ? "" : "no distances from link to link: " + self.status_text;
+  if (!is_measured) return "no distances from link to link: " + self.status_text;
+  const std::string link = proximity_->other_geometry();
+  return link.empty() ? ""
+                      : "the distances from link to link are of another geometry of '" + link +
+                            "' than those to obstacles";
 }
 
 std::string CommandFilter::why_not(const PlacedAnswers& placed, const ros::Subscriber& subscriber,

@@ -55,6 +55,12 @@ std::vector<double> positions_after(double time, const JointCommand& command,
   return positions;
 }
 
+// [rad, m] From where a joint is to a position.
+double way(const std::string& joint, double position, const CommandReader& reader) {
+  const auto j = reader.kinematics ? reader.kinematics->find_joint(joint) : std::nullopt;
+  return j ? reader.kinematics->joints()[*j].way(reader.q(joint), position) : kNaN;
+}
+
 }  // namespace
 
 JointCommand read_command(const trajectory_msgs::JointTrajectory& message,
@@ -81,7 +87,7 @@ JointCommand read_command(const trajectory_msgs::JointTrajectory& message,
         time);
   } else {
     for (std::size_t i = 0; i < command.joints.size(); ++i) {
-      command.velocity[i] = (point.positions[i] - reader.q(command.joints[i])) / time;
+      command.velocity[i] = way(command.joints[i], point.positions[i], reader) / time;
     }
   }
   check(&command);

@@ -34,9 +34,9 @@ struct JointCommand {
 struct CommandReader {
   std::vector<std::string> joints;  ///< of a message that names none
   JointPositionOf q;
-  // The rest is read for twists alone.
   std::shared_ptr<const Kinematics> kinematics;  ///< null: not known yet, and no twist is read
-  std::string tool;                              ///< link that a twist moves; empty: its frame
+  // The rest is read for twists alone.
+  std::string tool;  ///< link that a twist moves; empty: its frame
   ros::Time now;
   double timeout;  ///< [s] oldest twist that still counts
 };

@@ -187,6 +187,19 @@ const ConstraintRows& ProximityRows::rows(const PlacedAnswers& obstacles, const 
   return rows;
 }
 
+std::string ProximityRows::other_geometry() const {
+  if (!obstacles_ || !self_) return "";
+  for (const ist_proximity::LinkProximity& link : obstacles_->links) {
+    for (const ist_proximity::LinkProximity& other : self_->links) {
+      if (link.link != other.link) continue;
+      const Eigen::AlignedBox3d box = box_of(link), other_box = box_of(other);
+      const bool is_same = box.min() == other_box.min() && box.max() == other_box.max();
+      if (!is_same && !box.isEmpty() && !other_box.isEmpty()) return link.link;
+    }
+  }
+  return "";
+}
+
 RowAnswer ProximityRows::answer(const RowOrigin& origin) const {
   const auto i = static_cast<std::size_t>(origin.index);
   if (origin.is_pair) {

@@ -54,6 +54,10 @@ class ProximityRows {
                              const std::vector<double>& q_now, const RowConfig& config,
                              double self_stop_distance);
 
+  /// A link of whose geometry the two messages differ, as after an object was attached; empty:
+  /// none.
+  std::string other_geometry() const;
+
   /// The origin of a row of the last rows().
   RowAnswer answer(const RowOrigin& origin) const;
   const std::vector<std::size_t>& joints() const { return builder_->joints(); }  ///< by column

@@ -61,16 +61,17 @@ template <typename Message, typename Read>
 ros::Subscriber subscribe_as(const SourceConfig& config, ros::NodeHandle* nh,
                              const Receiver& receive, const Read& read,
                              const Factory<Message>& make = ros::DefaultMessageCreator<Message>()) {
-  const boost::function<void(const boost::shared_ptr<const Message>&)> callback =
-      [receive, read, config](const boost::shared_ptr<const Message>& message) {
-        receive([&] {
-          Measurement measurement = read(message);
-          measurement.content = content_of(*message, config);
-          return measurement;
-        });
-      };
+  using Event = ros::MessageEvent<const Message>;
+  const boost::function<void(const Event&)> callback = [receive, read, config](const Event& event) {
+    receive([&] {
+      Measurement measurement = read(event.getConstMessage());
+      measurement.publisher = event.getPublisherName();
+      measurement.content = content_of(*event.getConstMessage(), config);
+      return measurement;
+    });
+  };
   ros::SubscribeOptions options;
-  options.init<Message>(config.topic, kQueueSize, callback, make);
+  options.initByFullCallbackType<const Event&>(config.topic, kQueueSize, callback, make);
   options.transport_hints = ros::TransportHints().tcpNoDelay();
   return nh->subscribe(options);
 }

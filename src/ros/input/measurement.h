@@ -42,6 +42,7 @@ struct Placement {
 /// One message of a sensor or map, checked, whatever its type.
 struct Measurement {
   std_msgs::Header header;
+  std::string publisher;      ///< the node that has sent it; empty: it is of a file
   std::string fault;          ///< why it cannot be used; empty: it can
   std::string doubt;          ///< a sentence about a message that is used all the same
   std::uint64_t content = 0;  ///< equal for messages of the same bytes; 0: not asked

@@ -21,7 +21,7 @@ namespace {
 // Clouds of one stream may overtake each other; stamps that go back farther are a new start. [s]
 constexpr double kMaxDisorder = 1.0;
 // [s] For so long the frames of a topic are remembered at most.
-constexpr double kFrameMemory = 10.0;
+constexpr double kSensorMemory = 10.0;
 // Characters of a frame's name, which every status that mentions it repeats.
 constexpr std::size_t kMaxFrameName = 256;
 const ros::WallDuration kPollIdle(0.05), kPollTaken(0.005), kPollTf(0.0005);
@@ -126,7 +126,7 @@ void SensorSource::receive(Measurement measurement) {
   take_target();
   const ros::Time stamp = measurement.header.stamp;
   std::string problem = check(measurement);
-  if (problem.empty() && !is_map_) problem = note_frame(without_slash(measurement.header.frame_id));
+  if (problem.empty() && !is_map_) problem = note_sensor(measurement);
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
   if (is_believed) tell_skew(ahead);
@@ -209,31 +209,33 @@ std::string SensorSource::check(const Measurement& measurement) const {
 }
 
 /// Each cloud takes the place of the one before, so that of several sensors only one would be seen
-/// at a time. A sensor that gets another frame keeps it for longer than the timeout, or 10 s; once
-/// frames have come by turns, for those 10 s.
+/// at a time. A sensor that gets another frame or node keeps it for longer than the timeout, or
+/// 10 s; once they have come by turns, for those 10 s.
 /// @returns empty, or why the messages of now, and the one in use, cannot be used
-std::string SensorSource::note_frame(const std::string& frame) {
+std::string SensorSource::note_sensor(const Measurement& measurement) {
+  const std::string sensor =
+      "'" + without_slash(measurement.header.frame_id) + "' (of " + measurement.publisher + ")";
   const ros::Time now = ros::Time::now();
-  const double longest = std::min(config_.timeout, kFrameMemory);  // the timeout may be infinite
-  if (frame != frame_) {
-    frame_before_ = std::exchange(frame_, frame);
-    frames_left_[frame_before_] = now;
+  const double longest = std::min(config_.timeout, kSensorMemory);  // the timeout may be infinite
+  if (sensor != sensor_) {
+    sensor_before_ = std::exchange(sensor_, sensor);
+    sensors_left_[sensor_before_] = now;
     const bool has_alternated =
-        std::abs(seconds_between(frames_alternate_until_, now)) < kFrameMemory;
-    const double memory = has_alternated ? kFrameMemory : longest;
-    for (auto left = frames_left_.begin(); left != frames_left_.end();) {
+        std::abs(seconds_between(sensors_alternate_until_, now)) < kSensorMemory;
+    const double memory = has_alternated ? kSensorMemory : longest;
+    for (auto left = sensors_left_.begin(); left != sensors_left_.end();) {
       const bool is_over = !(std::abs(seconds_between(left->second, now)) < memory);
-      left = is_over ? frames_left_.erase(left) : std::next(left);
+      left = is_over ? sensors_left_.erase(left) : std::next(left);
     }
-    if (frames_left_.count(frame) > 0) frames_alternate_until_ = now + ros::Duration(longest);
+    if (sensors_left_.count(sensor) > 0) sensors_alternate_until_ = now + ros::Duration(longest);
   }
   // The clock may have gone back.
-  const double left = seconds_between(now, frames_alternate_until_);
+  const double left = seconds_between(now, sensors_alternate_until_);
   if (!(left > 0.0 && left <= longest)) return "";
   std::string problem =
-      "its " + noun_ + "s come by turns in the frames '" + std::min(frame_, frame_before_) +
-      "' and '" + std::max(frame_, frame_before_) +
-      "', so that one would hide the other: give each sensor a topic and a source of its own";
+      "its " + noun_ + "s come by turns in the frames " + std::min(sensor_, sensor_before_) +
+      " and " + std::max(sensor_, sensor_before_) +
+      ", so that one would hide the other: give each sensor a topic and a source of its own";
   waiting_.clear();
   update([&](SourceReport* report) { report->alternation = problem; });
   return problem;

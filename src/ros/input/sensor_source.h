@@ -59,7 +59,7 @@ class SensorSource : public Source {
   void tell_skew(double ahead) const;
   void keep(Measurement measurement);
   std::string check(const Measurement& measurement) const;
-  std::string note_frame(const std::string& frame);
+  std::string note_sensor(const Measurement& measurement);
   double went_back(const ros::Time& stamp) const;
   void start_again(const ros::Time& stamp);
   void place_newest();
@@ -89,14 +89,15 @@ class SensorSource : public Source {
   Ingest ingest_, zone_ingest_;  ///< the latter of what is in zones
   MeasurementQueue waiting_;
   std::shared_ptr<const Measurement> last_map_;
-  bool map_is_new_ = false;           ///< last_map_ is not in use with this model yet
-  ros::Time in_use_;                  ///< stamp of the newest snapshot of this generation
-  std::uint64_t content_ = 0;         ///< Measurement::content of the newest message
-  std::string frame_, frame_before_;  ///< of the newest message, and another one before it
-  std::string view_frame_;            ///< of the clouds that ingest_ has seen,
-  std::uint64_t view_changes_ = 0;    ///< while so many static transforms had changed
-  std::map<std::string, ros::Time> frames_left_;  ///< when another one took a frame's place
-  ros::Time frames_alternate_until_;
+  bool map_is_new_ = false;    ///< last_map_ is not in use with this model yet
+  ros::Time in_use_;           ///< stamp of the newest snapshot of this generation
+  std::uint64_t content_ = 0;  ///< Measurement::content of the newest message
+  /// Frame and node of the newest message, and of another one before it.
+  std::string sensor_, sensor_before_;
+  std::string view_frame_;                         ///< of the clouds that ingest_ has seen,
+  std::uint64_t view_changes_ = 0;                 ///< while so many static transforms had changed
+  std::map<std::string, ros::Time> sensors_left_;  ///< when another one took a sensor's place
+  ros::Time sensors_alternate_until_;
   std::chrono::steady_clock::time_point target_since_;  ///< with this model and generation
   std::chrono::steady_clock::time_point waits_since_;   ///< nothing waited, or one was ingested
   bool waits_for_tf_ = false;                           ///< the reported problem is that wait

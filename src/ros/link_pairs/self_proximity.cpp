@@ -74,10 +74,12 @@ void SelfProximity::run() {
 }
 
 /// Says why nothing is known; empty: the model has no fault.
-void SelfProximity::publish_unknown(const std::string& problem) {
+void SelfProximity::publish_unknown(const std::string& problem,
+                                    std::optional<ModelState::Phase> phase) {
   const auto message = boost::make_shared<ProximityArray>();
   ModelState model = model_ ? *model_ : ModelState();
   model.problem = problem;
+  if (phase) model.phase = *phase;
   CycleReport report;  // nobody reads it
   fill_without_model(model, node_.config, std::max(ros::Time::now(), last_stamp_), {},
                      message.get(), &report);
@@ -98,6 +100,8 @@ void SelfProximity::take_model() {
   }
   query_.reset();
   if (!model_->is_ready() || !model_->kinematics) return;  // pairs need all links
+  if (!model_->rules_problem.empty()) return;
+  publish_unknown("the pairs of links are being chosen", ModelState::Phase::kPacking);
   query_ =
       std::make_unique<SelfQuery>(model_->robot, watched_pairs(), node_.config.query, is_stopped_);
   pose_source_ = make_pose_source(*model_, node_.config, node_.buffer, node_.joints,
@@ -219,8 +223,8 @@ void SelfProximity::publish_once() {
   }
   last_now_ = now;
   if (!query_) {
-    const bool is_faulty = model_->problem.empty() && !model_->kinematics;
-    return publish_unknown(is_faulty ? no_kinematics(*model_) : model_->problem);
+    if (!model_->problem.empty()) return publish_unknown(model_->problem);
+    return publish_unknown(model_->kinematics ? model_->rules_problem : no_kinematics(*model_));
   }
   const auto message = boost::make_shared<ProximityArray>();
   LiveConfig live = node_.live();

@@ -37,7 +37,8 @@ class SelfProximity : public AddOn {
  private:
   void run();
   void publish_once();
-  void publish_unknown(const std::string& problem);
+  void publish_unknown(const std::string& problem,
+                       std::optional<ModelState::Phase> phase = std::nullopt);
   void publish(const ist_proximity::ProximityArrayConstPtr& message);
   void take_model();
   std::vector<LinkPair> watched_pairs() const;

@@ -150,20 +150,26 @@ void ModelLoader::load_once() {
 
 /// Reads the SRDF beside the URDF, where there is one.
 void ModelLoader::read_rules(ModelState* state) {
-  std::string key, srdf;
-  if (!nh_.searchParam(config_.robot_description + "_semantic", key) || !nh_.getParam(key, srdf)) {
+  std::string key;
+  XmlRpc::XmlRpcValue value;
+  if (!nh_.searchParam(config_.robot_description + "_semantic", key) || !nh_.getParam(key, value)) {
     return;
   }
   state->problem = "reading the SRDF in '" + key + "'";
   set_state(*state);
   try {
+    if (value.getType() != XmlRpc::XmlRpcValue::TypeString) throw ModelError("it is no string");
+    const std::string& srdf = static_cast<std::string&>(value);
     state->rules = std::make_shared<const CollisionRules>(
         read_srdf(srdf, state->kinematics.get(), [this] { return cancelled(); }));
     for (const std::string& doubt : state->rules->doubts) {
       state->warnings.push_back("'" + key + "': " + doubt);
     }
   } catch (const ModelError& error) {
-    state->warnings.push_back("'" + key + "' is not used: " + error.what());
+    // It may enable pairs that are left out without it.
+    state->rules_problem = "the SRDF in '" + key + "' cannot be used: " + error.what() +
+                           "; mend it or delete it, then call ~reload_model";
+    state->warnings.push_back(state->rules_problem);
   }
 }
 

@@ -69,6 +69,7 @@ struct ModelState {
   std::shared_ptr<const Kinematics>
       kinematics;                  ///< known from kPacking on; null where it is faulty
   std::string kinematics_problem;  ///< why `kinematics` is null
+  std::string rules_problem;       ///< why no pairs of links can be chosen; empty: they can
   std::shared_ptr<const RobotDescription> description;  ///< the parsed URDF; known from kPacking on
   std::vector<AttachedObject> objects;                  ///< known when ready: parts of `robot`
 

@@ -141,7 +141,7 @@ std::string TrajectoryWatch::why_elsewhere(double time) {
     if (std::isnan(q_now)) {
       return "the position of joint '" + name + "' is not known: joint_states must hold it";
     }
-    const double off = distance_between(one, q_now, q[joint]);
+    const double off = one.way(q[joint], q_now);
     const double turns = q_now - q[joint] - off;  // [rad] whole ones
     for (std::vector<double>& at : trajectory_.pieces.positions) at[joint] += turns;
     if (std::abs(off) <= config_.trajectory.tolerance) continue;

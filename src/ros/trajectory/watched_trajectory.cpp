@@ -100,11 +100,6 @@ sensor_msgs::JointState WatchedTrajectory::state(const Kinematics& kinematics, d
   return message;
 }
 
-double distance_between(const Kinematics::Joint& joint, double present, double q) {
-  const double way = present - q;
-  return joint.type == JointType::kContinuous ? std::remainder(way, 2.0 * M_PI) : way;
-}
-
 std::string read_trajectory(const Message& message, const Kinematics& kinematics,
                             const PresentMotion& present, const ros::Time& received,
                             WatchedTrajectory* trajectory) {
@@ -126,7 +121,7 @@ std::string read_trajectory(const Message& message, const Kinematics& kinematics
       const std::string& name = message.joint_names[j];
       const double to = first.positions[j];
       const JointMotionNow now = present(name);
-      q.push_back(to + distance_between(kinematics.joints()[joints[j]], now.q, to));
+      q.push_back(to + kinematics.joints()[joints[j]].way(to, now.q));
       dq.push_back(std::abs(now.dq) <= kMaxNumber ? now.dq : 0.0);  // not NaN
       if (std::isnan(q.back())) {
         return "its first point is not at time 0, and the position of joint '" + name +

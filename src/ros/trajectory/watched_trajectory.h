@@ -33,9 +33,6 @@ struct WatchedTrajectory {
   sensor_msgs::JointState state(const Kinematics& kinematics, double time) const;
 };
 
-/// [rad, m] How far a joint at `present` is from `q`; of a continuous one without whole turns.
-double distance_between(const Kinematics::Joint& joint, double present, double q);
-
 /// Reads a message with one point or more. Where its first point is not at time 0, the trajectory
 /// begins at the joints' present positions and velocities, as controllers do: they leave out whole
 /// turns of continuous joints. A velocity that is not known is 0.

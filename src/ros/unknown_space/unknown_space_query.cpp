@@ -66,12 +66,13 @@ std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vec
     surroundings_.assign(surroundings_.size(), std::nullopt);
     surroundings_distance_ = influence_distance;
   }
+  const std::size_t last = next_;
   for (std::size_t i = 1; i <= answers_.size(); ++i) {
-    const std::size_t link = (next_ + i) % answers_.size();
+    const std::size_t link = (last + i) % answers_.size();
     if (!known[link]) continue;
     next_ = link;
     look_about(link, X_FL[link], poses.stamp.toSec(), influence_distance, *unknown);
-    break;
+    if (is_only_reader_) break;  // another configuration has nothing in common with the last one
   }
   return "";
 }
@@ -102,7 +103,8 @@ double UnknownSpaceQuery::deepest(std::size_t link) const {
   return -2.0 * model_->links[link].tree.radius();
 }
 
-/// Finds the seen share of one link a cycle, which is what takes longest.
+/// Finds the seen share of one link, which is what takes longest: the node's cycle does it by
+/// turns.
 void UnknownSpaceQuery::look_about(std::size_t link, const Eigen::Isometry3d& X_FL, double now,
                                    double influence_distance, const UnknownSnapshot& unknown) {
   std::optional<Surroundings>& surroundings = surroundings_[link];
