@@ -8,10 +8,11 @@ import proximity_testing as pt
 import rospy
 from joint_states_test import ARM, JointStatesTest
 from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from ist_proximity.msg import JointRepulsion, LinkPair
-from ist_proximity.srv import DetachObject, ListLinkPairs
+from ist_proximity.srv import DetachObject, ListLinkPairs, QueryProximity
 
 SRDF = '<robot name="arm"><disable_collisions link1="box_link" link2="ball_link"/></robot>'
 SRDF_DEFAULT = '<robot name="arm"><disable_default_collisions link="box_link"/></robot>'
@@ -232,6 +233,9 @@ class SelfProximityTest(unittest.TestCase):
             node = self.start("srdf")
             message = node.wait_for_status(ProximityArray.MODEL_ERROR, "the SRDF in '%s' cannot be used" % name)
             self.assertTrue(pt.all_unknown(message))
+            answer = node.service("query", QueryProximity)([JointState()], [], [], True)
+            self.assertIn("cannot be used", answer.message)
+            self.assertFalse(answer.success)
             rospy.set_param(name, SRDF)
             self.assertTrue(node.reload().success)
             node.wait_for_status(ProximityArray.OK)

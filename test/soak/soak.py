@@ -309,7 +309,7 @@ def judge(rows, checker, code, folder, arguments, report):
         # messages that wait for a slow subscriber, and queries, come and go.
         first, last = later[: len(later) // 3], later[-(len(later) // 3):]
         threads, descriptors = last[:, 2:4].min(0) - first[:, 2:4].min(0)
-        # The least memory of a thousand seconds is one lucky second, and differs by 1 MB between them.
+        # The least memory of a thousand seconds is one lucky second.
         growth = np.percentile(last[:, 1], 10) - np.percentile(first[:, 1], 10)
         if growth > arguments.max_growth:
             failures.append("memory grew by %.1f MB, allowed is %g" % (growth, arguments.max_growth))
@@ -341,8 +341,9 @@ def main():
     parser.add_argument("folder")
     arguments = parser.parse_args(rospy.myargv()[1:])
     if arguments.max_growth is None:
-        # Short runs see allocators warm up, each thread its own.
-        arguments.max_growth = 1.0 if arguments.minutes >= 20 else 16.0
+        # Short runs see allocators warm up, each thread its own. What the allocator holds goes up and down
+        # by 1.5 MB while the blocks in use do not.
+        arguments.max_growth = 2.0 if arguments.minutes >= 20 else 16.0
     os.makedirs(arguments.folder, exist_ok=True)
     rospy.init_node("soak", disable_signals=True)
 

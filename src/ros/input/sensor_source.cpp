@@ -20,7 +20,7 @@ namespace {
 
 // Clouds of one stream may overtake each other; stamps that go back farther are a new start. [s]
 constexpr double kMaxDisorder = 1.0;
-// [s] For so long the frames of a topic are remembered at most.
+// [s] For so long the sensors on a topic are remembered at most.
 constexpr double kSensorMemory = 10.0;
 // Characters of a frame's name, which every status that mentions it repeats.
 constexpr std::size_t kMaxFrameName = 256;

@@ -124,6 +124,7 @@ std::string QueryService::run(const Service::Request& request, Service::Response
   std::string problem = check_times(request.times, request.states.size());
   if (problem.empty()) problem = stated_.take_model();
   if (problem.empty()) problem = choose_links(request.links);
+  if (problem.empty() && request.self_proximity != 0) problem = stated_.model()->rules_problem;
   if (problem.empty() && request.self_proximity != 0) {
     self_.set_model(stated_.model());
     self_.choose(chosen_);
