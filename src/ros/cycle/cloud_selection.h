@@ -69,7 +69,7 @@ class CloudSelection {
   void take_obstacles(const StatusInput& status);
   bool stands_still(std::size_t source, const SourceReport& report);
 
-  /// Of the obstacles of a source.
+  /// The motion of a source's obstacles.
   struct Motion {
     std::uint64_t cloud = 0;  ///< the last one's obstacles_key()
     PlaceMotion place;
