@@ -221,9 +221,13 @@ class OctomapTest(pt.NodeTest):
         node.wait_for_status(ProximityArray.OK)
         errors = []
         for m in node.next_messages(300):
-            self.assertEqual(m.status, ProximityArray.OK, m.status_text)
-            X = pt.inverse(X_base_map(m.header.stamp.to_sec()))
-            errors.append(pt.link(m, "ball_link").distance - ball_truth(tree.boxes(), X))
+            truth = ball_truth(tree.boxes(), pt.inverse(X_base_map(m.header.stamp.to_sec())))
+            self.assertLessEqual(pt.link(m, "ball_link").lower_bound, truth + 1e-4)
+            if m.status != ProximityArray.OK:  # a loaded machine may send tf later than that
+                self.assertIn("the newest pose of frame 'map' is", m.status_text)
+                continue
+            errors.append(pt.link(m, "ball_link").distance - truth)
+        self.assertGreater(len(errors), 150)
         # tf2 takes the transforms of a message one by one. An answer between the ball's and the map's
         # has the map's newest pose, of the message before: 20 ms, or some more on a busy machine.
         errors = np.abs(errors)
