@@ -222,8 +222,7 @@ class VelocityFilterTest(SlidesTest):
         self.assertEqual(list(limited.command), [0.5, 0.1])
         self.check_stopped(STOP)
         self.assertLess(WALL - RADIUS - self.q[0], STOP + 0.15)
-        # Along the wall it still goes.
-        self.assertGreater(self.velocity[1], 0.05)
+        pt.wait_until(lambda: self.velocity[1] > 0.05, "the ball to go along the wall")
         # The row that binds is drawn.
         drawn = []
         listener = rospy.Subscriber(
