@@ -346,7 +346,7 @@ std::string CommandFilter::why_not(const JointCommand& command, const ros::Time&
   const bool is_measured = self.status != ist_proximity::ProximityArray::LOADING &&
                            self.status != ist_proximity::ProximityArray::MODEL_ERROR;
   if (!is_measured) return "no distances from link to link: " + self.status_text;
-  const std::string link = proximity_->other_geometry();
+  const std::string& link = proximity_->other_geometry();
   return link.empty() ? ""
                       : "the distances from link to link are of another geometry of '" + link +
                             "' than those to obstacles";

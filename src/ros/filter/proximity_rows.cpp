@@ -63,6 +63,7 @@ void ProximityRows::set(const ist_proximity::ProximityArray::ConstPtr& obstacles
                         const ist_proximity::ProximityArray::ConstPtr& self) {
   obstacles_ = obstacles;
   self_ = self;
+  other_geometry_.clear();
   std::vector<LinkBox> boxes;
   std::vector<LinkPair> pairs;
   for (const auto& message : {obstacles, self}) {
@@ -70,7 +71,10 @@ void ProximityRows::set(const ist_proximity::ProximityArray::ConstPtr& obstacles
     for (const ist_proximity::LinkProximity& link : message->links) {
       const std::size_t place = place_of(link.link, boxes);
       if (place == boxes.size()) boxes.push_back({link.link, {}});
-      boxes[place].box_L.extend(box_of(link));
+      const LinkBox other = boxes[place], box{link.link, box_of(link)};
+      const bool are_known = !other.box_L.isEmpty() && !box.box_L.isEmpty();
+      if (are_known && !is_same(box, other)) other_geometry_ = link.link;
+      boxes[place].box_L.extend(box.box_L);
     }
   }
   if (self) {
@@ -185,19 +189,6 @@ const ConstraintRows& ProximityRows::rows(const PlacedAnswers& obstacles, const 
   builder_->set_config(of_pairs);
   builder_->add_pairs(pair_results_);
   return rows;
-}
-
-std::string ProximityRows::other_geometry() const {
-  if (!obstacles_ || !self_) return "";
-  for (const ist_proximity::LinkProximity& link : obstacles_->links) {
-    for (const ist_proximity::LinkProximity& other : self_->links) {
-      if (link.link != other.link) continue;
-      const Eigen::AlignedBox3d box = box_of(link), other_box = box_of(other);
-      const bool is_same = box.min() == other_box.min() && box.max() == other_box.max();
-      if (!is_same && !box.isEmpty() && !other_box.isEmpty()) return link.link;
-    }
-  }
-  return "";
 }
 
 RowAnswer ProximityRows::answer(const RowOrigin& origin) const {

@@ -56,7 +56,7 @@ class ProximityRows {
 
   /// A link of whose geometry the two messages differ, as after an object was attached; empty:
   /// none.
-  std::string other_geometry() const;
+  const std::string& other_geometry() const { return other_geometry_; }
 
   /// The origin of a row of the last rows().
   RowAnswer answer(const RowOrigin& origin) const;
@@ -73,6 +73,7 @@ class ProximityRows {
   std::shared_ptr<const Kinematics> kinematics_;
   ist_proximity::ProximityArray::ConstPtr obstacles_, self_;
   std::optional<ConstraintRowBuilder> builder_;
+  std::string other_geometry_;
   std::vector<LinkBox> boxes_;          ///< of the obstacles' links, then of other links of pairs
   std::vector<double> turns_;           ///< by joint of the kinematics: t_k
   std::vector<LinkProximity> results_;  ///< by link of the obstacles' message
