@@ -73,6 +73,10 @@ foreach(target ist_proximity_ros ist_proximity_ros_objects ${add_on_targets} pro
   target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
 endforeach()
 
+# What a robot runs: without tools, examples, the simulator and the Python module.
+add_custom_target(ist_proximity_nodes DEPENDS proximity_node velocity_filter_node ist_proximity_nodelet
+  ${${PROJECT_NAME}_EXPORTED_TARGETS})
+
 # The demonstration of a controller: a simulated robot and an example controller.
 add_executable(simulator_node simulator/nodes/simulator_node.cpp)
 target_link_libraries(simulator_node PRIVATE ist_proximity_simulator ${catkin_LIBRARIES})
