@@ -61,6 +61,6 @@ elseif(CATKIN_ENABLE_TESTING OR BUILD_TESTING)
   add_test(NAME python_module COMMAND ${Python_EXECUTABLE} -m pytest -q -p no:cacheprovider
     --junitxml=${CMAKE_BINARY_DIR}/test_results/${PROJECT_NAME}/gtest-python_module.xml
     ${CMAKE_CURRENT_SOURCE_DIR}/test/python)
-  set_tests_properties(python_module PROPERTIES LABELS core TIMEOUT 3600 COST 28
+  set_tests_properties(python_module PROPERTIES LABELS core TIMEOUT 600 COST 28
     ENVIRONMENT "PYTHONPATH=${python_path};PYTHONDONTWRITEBYTECODE=1")
 endif()

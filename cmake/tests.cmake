@@ -78,8 +78,11 @@ function(ist_proximity_gtest test)
     add_test(NAME ${test} COMMAND ${test} ${arguments})
     set(ctest_name ${test})
   endif()
-  # Packing takes thirty times as long under a sanitizer, and beside rostests what they leave.
-  set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT 3600)
+  set(timeout 600)
+  if(IST_PROXIMITY_SANITIZE)
+    set(timeout 3600)  # packing takes thirty times as long
+  endif()
+  set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT ${timeout})
   ist_proximity_cost(${ctest_name}
     packer 30 accuracy_doc 25 closed_loop 20 contact_known 16 link_pair_exact 13 contact_of_links 12)
 endfunction()
@@ -159,7 +162,7 @@ if(catkin_FOUND AND TARGET ist_proximity_ros)
     set(arguments --gtest_output=xml:${results_dir}/gtest-${test}.xml)
     catkin_run_tests_target(gtest ${test} gtest-${test}.xml
       COMMAND "${CMAKE_CURRENT_BINARY_DIR}/test/${test} ${arguments}" DEPENDENCIES ${test})
-    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${test} PROPERTIES LABELS core TIMEOUT 3600)
+    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${test} PROPERTIES LABELS core TIMEOUT 600)
   endforeach()
 endif()
 
