@@ -123,7 +123,8 @@ class Checker:
         for what, stamp in (("cloud", message.cloud_stamp), ("poses", message.header.stamp)):
             age = now - stamp.to_sec()
             if age > TIMEOUT + max(gap, IDLE_PERIOD) + DELIVERY:
-                self.complain("stale shown as fresh", "%s %.3f s old" % (what, age))
+                self.complain("stale shown as fresh", "%s %.3f s old, header.stamp %.3f s" % (
+                    what, age, now - message.header.stamp.to_sec()))
 
     def check_values(self, known):
         poses_at = np.array([m.header.stamp.to_sec() for _, _, m in known])
