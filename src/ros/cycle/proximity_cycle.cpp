@@ -188,7 +188,7 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   for (const LateFrames* late : {&late_worlds_, &late_maps_}) {
     note(Rank::kDegraded, "pose", late->doubt(query.tolerance), &status_input_.findings);
   }
-  cloud_results_ = results_;
+  if (worlds_.any()) cloud_results_ = results_;
   worlds_.combine(selection_.clouds(), &results_);
   note_usage(config);
 }

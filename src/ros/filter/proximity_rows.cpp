@@ -16,8 +16,11 @@ Eigen::AlignedBox3d box_of(const ist_proximity::LinkProximity& message) {
   return {center - 0.5 * size, center + 0.5 * size};
 }
 
+bool is_same_box(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) {
+  return a.min() == b.min() && a.max() == b.max();
+}
 bool is_same(const LinkBox& a, const LinkBox& b) {
-  return a.link == b.link && a.box_L.min() == b.box_L.min() && a.box_L.max() == b.box_L.max();
+  return a.link == b.link && is_same_box(a.box_L, b.box_L);
 }
 bool is_same_pair(const LinkPair& a, const LinkPair& b) {
   return a.first == b.first && a.second == b.second;
@@ -71,10 +74,11 @@ void ProximityRows::set(const ist_proximity::ProximityArray::ConstPtr& obstacles
     for (const ist_proximity::LinkProximity& link : message->links) {
       const std::size_t place = place_of(link.link, boxes);
       if (place == boxes.size()) boxes.push_back({link.link, {}});
-      const LinkBox other = boxes[place], box{link.link, box_of(link)};
-      const bool are_known = !other.box_L.isEmpty() && !box.box_L.isEmpty();
-      if (are_known && !is_same(box, other)) other_geometry_ = link.link;
-      boxes[place].box_L.extend(box.box_L);
+      Eigen::AlignedBox3d& known_L = boxes[place].box_L;
+      const Eigen::AlignedBox3d box_L = box_of(link);
+      const bool are_known = !known_L.isEmpty() && !box_L.isEmpty();
+      if (are_known && !is_same_box(box_L, known_L)) other_geometry_ = link.link;
+      known_L.extend(box_L);
     }
   }
   if (self) {
