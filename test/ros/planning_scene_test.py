@@ -4,6 +4,7 @@
 import itertools
 import math
 import struct
+import sys
 import tempfile
 import unittest
 
@@ -16,6 +17,23 @@ from proximity_testing import ProximityArray
 ADD, REMOVE, APPEND, MOVE = range(4)
 # A binary OcTree with one occupied leaf, which begins at (0, 0, 0): 16 levels of inner nodes above it.
 ONE_LEAF = struct.pack("<16H", 3 << 14, *[3] * 14, 2)
+
+# A program in whose publishing a signal comes for sure: a lock that rospy holds there for microseconds is
+# held for longer.
+SLOW_PUBLISHING = """
+import runpy, sys, time
+from rospy.impl.tcpros_pubsub import QueuedConnection
+write = QueuedConnection.write_data
+
+def write_slowly(self, data):
+    with self._lock:
+        time.sleep(0.3)
+    return write(self, data)
+
+QueuedConnection.write_data = write_slowly
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
 
 
 def pose(x=0.0, y=0.0, z=0.0):
@@ -34,8 +52,8 @@ class Bridge:
 
     numbers = itertools.count()
 
-    def __init__(self, namespace, scenes, objects, *arguments):
-        command = [pt.find_program("ist_proximity", "planning_scene_bridge"), *arguments]
+    def __init__(self, namespace, scenes, objects, *arguments, wrapper=()):
+        command = [*wrapper, pt.find_program("ist_proximity", "planning_scene_bridge"), *arguments]
         command += ["planning_scene:=" + scenes, "world_objects:=" + objects]
         name = "bridge_%d_of_%s" % (next(self.numbers), objects)
         self.log = tempfile.TemporaryFile()
@@ -43,7 +61,7 @@ class Bridge:
 
     def stop(self):
         self.process.terminate()
-        self.process.wait()
+        self.process.wait(pt.TIMEOUT)
 
     def kill(self):
         self.process.kill()
@@ -361,6 +379,18 @@ class PlanningSceneTest(unittest.TestCase):
         # The next one begins with what is latched.
         self.bridges[0] = Bridge("/scenes", "monitored_planning_scene", "objects")
         self.distance(0.15, "the part, from the next bridge", "noetic")
+
+    def test_8b_a_signal_while_it_publishes(self):
+        came = []
+        rospy.Subscriber("/scenes/slow", rospy.AnyMsg, came.append)
+        wrapper = (sys.executable, "-c", SLOW_PUBLISHING)
+        bridge = Bridge("/scenes", "monitored_planning_scene", "slow", wrapper=wrapper)
+        pt.wait_until(lambda: came, "a message")
+        for _ in range(10):
+            self.noetic.send(is_diff=False)
+        pt.wait_until(lambda: len(came) > 2, "what is sent again and again")
+        bridge.stop()
+        self.assertEqual(bridge.process.returncode, 0)
 
     def test_9_a_connection_that_is_lost_and_a_publisher_that_is_gone(self):
         self.noetic.send(self.noetic.box("part", (0, 0.35, 0)), is_diff=False)

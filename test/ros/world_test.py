@@ -329,7 +329,10 @@ class FreshWorldTest(pt.NodeTest):
         parts = rospy.Publisher(self.namespace + "/parts", WorldObjects, queue_size=10)
         self.world.stand()
         self.world.start_tf()
-        node = self.start(sources={"parts": {"type": "world", "topic": "parts", "timeout": 1.0}})
+        # Without a deadline: on a slow machine it would pass, which is not what this is about.
+        parameters = {"query/deadline": 0.0}
+        parameters["sources"] = {"parts": {"type": "world", "topic": "parts", "timeout": 1.0}}
+        node = self.start(**parameters)
         pt.wait_until(lambda: parts.get_num_connections() > 0, "the node to listen")
 
         def send(*objects):
